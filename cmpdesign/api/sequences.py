@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from cmpdesign.api.layouts import reference_from
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.tracking.live.options import Live, LiveKind
 from cmpdesign.tracking.recording.options import DEFAULT_FRAME_ID, Recording
 
 if TYPE_CHECKING:
@@ -42,7 +43,9 @@ class ReadingOptions(TypedDict, total=False):
         preset, response, side, channels: see ``extractor.Extractor``.
         max_pixels: largest image that is read, width x height.
         frame_id: coordinate frame and first part of the topics of a recording; "tactile".
-        with_images: also record the frames' images; False.
+        with_images: also record, or show live, the frames' images; False.
+        live: also show the frames while the run goes on, by "foxglove" or "rerun"; None.
+        live_port, live_wait_s: see ``Live``; None and 0.
     """
 
     fps: float | None
@@ -55,6 +58,9 @@ class ReadingOptions(TypedDict, total=False):
     max_pixels: int
     frame_id: str
     with_images: bool
+    live: LiveKind | None
+    live_port: int | None
+    live_wait_s: float
 
 
 @dataclass(frozen=True)
@@ -62,7 +68,8 @@ class Reading:
     """``ReadingOptions`` with their defaults.
 
     Raises:
-        CmpDesignError: a rate or a number of frames that is not above 0, or a frame id that no topic can have.
+        CmpDesignError: a rate or a number of frames that is not above 0, a frame id that no topic can have, or a live
+            server that cannot be.
     """
 
     fps: float | None = None
@@ -75,15 +82,27 @@ class Reading:
     max_pixels: int = MOST_PIXELS
     frame_id: str = DEFAULT_FRAME_ID
     with_images: bool = False
+    live: LiveKind | None = None
+    live_port: int | None = None
+    live_wait_s: float = 0.0
 
     def __post_init__(self) -> None:
         _require_positive("fps", self.fps)
         _require_positive("frames", self.frames)
-        _ = self.recording
+        _ = self.recording, self.viewer
 
     @property
     def recording(self) -> Recording:
         return Recording(self.frame_id, self.with_images)
+
+    @property
+    def viewer(self) -> Live | None:
+        """The live server's options."""
+        if self.live is None:
+            if self.live_port is not None or self.live_wait_s:
+                raise CmpDesignError("--live-port and --live-wait are options of --live; give it, too")
+            return None
+        return Live(self.live, self.live_port, self.live_wait_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,9 +287,9 @@ class TrackJob:
 
     def prepare(self) -> TrackingRun:
         """The run; all checks of the input are made here, before a file is written."""
+        from cmpdesign.tracking.live.outputs import open_outputs
         from cmpdesign.tracking.overlay import OverlayWriter
         from cmpdesign.tracking.run import TrackingRun, read_rest_markers
-        from cmpdesign.tracking.sinks.tables import open_sink
         from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
         from cmpdesign.tracking.summary import TrackStatistics
         from cmpdesign.tracking.table import TrackTable
@@ -297,8 +316,9 @@ class TrackJob:
         video = None
         if self.overlay is not None:
             video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
-        sink = open_sink(self.output, TrackTable(tracker), how.recording)
-        return TrackingRun(frames, tracker, sink, TrackStatistics(self.layout), video, how.frames)
+        outputs = open_outputs(self.output, TrackTable(tracker), how.recording, how.viewer)
+        statistics = TrackStatistics(self.layout)
+        return TrackingRun(frames, tracker, outputs.sink, statistics, video, how.frames, live=outputs.live)
 
     def summary(self, run: TrackingRun) -> dict[str, Any]:
         """The JSON object of the summary."""
@@ -336,12 +356,12 @@ class ReconstructJob:
 
     def prepare(self) -> TrackingRun:
         """The run; all checks of the input are made here, before a file is written."""
+        from cmpdesign.tracking.live.outputs import open_outputs
         from cmpdesign.tracking.marker_depth import read_elastomer, read_marker_depth_mm
         from cmpdesign.tracking.run import TrackingRun
         from cmpdesign.tracking.shape_summary import ShapeStatistics
         from cmpdesign.tracking.shape_table import ShapeTable
-        from cmpdesign.tracking.sinks.tables import open_sink
-        from cmpdesign.tracking.sources import open_sources
+        from cmpdesign.tracking.sources import open_sources, split_list
         from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_rig
 
         how, shape = self.reading, self.shape
@@ -359,9 +379,10 @@ class ReconstructJob:
             model_px=shape.model_px,
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
-        sink = open_sink(
-            self.output, ShapeTable(reconstructor, continuation), replace(how.recording, views=rig.views)
-        )
+        source = open_sources(self.source, how.fps, how.max_pixels)
+        is_one_a_view = len(split_list(self.source)) > 1
+        recording = replace(how.recording, views=rig.views, is_image_one_a_view=is_one_a_view)
+        outputs = open_outputs(self.output, ShapeTable(reconstructor, continuation), recording, how.viewer)
         tracker = ShapeTracker(
             reconstructor,
             warm=not how.cold,
@@ -369,10 +390,15 @@ class ReconstructJob:
             response=how.response,
             channels=how.channels,
         )
-        source = open_sources(self.source, how.fps, how.max_pixels)
         statistics = ShapeStatistics(reconstructor, depth_mm, shape.surface)
         return TrackingRun(
-            source, tracker, sink, statistics, limit=how.frames, warnings=reconstructor.warnings
+            source,
+            tracker,
+            outputs.sink,
+            statistics,
+            limit=how.frames,
+            warnings=reconstructor.warnings,
+            live=outputs.live,
         )
 
     def summary(self, run: TrackingRun) -> dict[str, Any]:
@@ -436,6 +462,8 @@ def write_summary(run: TrackingRun, job: Job) -> Followed:
     if not run.statistics.frames:
         return Followed(job.output, (job.output,), {}, run.ended_early, run.warnings)
     summary = job.summary(run)
+    if run.live is not None:
+        summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
     # Tables of several formats in one folder have a summary each.
     place = job.output.with_name(job.output.name + ".summary.json")
     contents: dict[Path, str | bytes] = {place: json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}

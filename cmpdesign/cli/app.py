@@ -21,7 +21,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # markup would swallow what stands in brackets in a help text
-    help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.",
+    help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.\n\n"
+    "Exit codes: 0 done, and what was judged is good; 1 done, and what was judged is not good; 2 bad input, or a file "
+    "that cannot be written; 130 stopped by Ctrl-C.",
     epilog=examples("cmpdesign build tac3d -o mine", "cmpdesign verify --help"),
 )
 for module, function in (

@@ -11,6 +11,7 @@ from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, prin
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
+    from cmpdesign.tracking.live.view import LiveCount
     from cmpdesign.tracking.run import TrackingRun
 
 EXIT_NOT_TRACKED = 1
@@ -29,8 +30,27 @@ def run_with_progress(run: TrackingRun, doing: str) -> None:
     from cmpdesign.tracking.run import stop_on_signal
 
     total = run.limit if run.limit is not None else run.source.total
-    with stop_on_signal(run.stop), progress_bar(doing, total, unit="frames") as advance:
-        run.go(lambda frame: advance(f"{run.statistics.tracked} tracked, {frame.elapsed_ms:.1f} ms"))
+    if run.live is not None:
+        say(f"live at {run.live.address}")
+    try:
+        with stop_on_signal(run.stop), progress_bar(doing, total, unit="frames") as advance:
+            run.go(lambda frame: advance(f"{run.statistics.tracked} tracked, {frame.elapsed_ms:.1f} ms"))
+    finally:
+        if run.live is not None:
+            _report_live(run.live.count())
+
+
+def _report_live(count: LiveCount) -> None:
+    """Print what viewers did not get."""
+    if count.failure:
+        print_warning(f"the live server stopped after {count.sent} frames ({count.failure})")
+    if count.left_out:
+        print_warning(
+            f"{count.left_out} of {count.sent + count.left_out} frames were not shown live: "
+            "there was no time to send them"
+        )
+    if count.is_viewer_behind:
+        print_warning("a live viewer read more slowly than frames came, and was not sent all of them")
 
 
 def exit_status(run: TrackingRun) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -12,12 +13,16 @@ from typing import TYPE_CHECKING, Any
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.images import read_image
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.tracking.live.view import LiveView
 from cmpdesign.tracking.overlay import OverlayWriter
 from cmpdesign.tracking.sinks.tables import FrameSink
 from cmpdesign.tracking.sources import FrameSource, open_source
 
 if TYPE_CHECKING:
     from extractor import Markers, Tracker
+
+
+WAIT_STEP_S = 0.1  # a stop is noticed after this time
 
 
 @dataclass(eq=False)
@@ -41,6 +46,7 @@ class TrackingRun:
         ended_early: reason for an early end; "" if all frames were tracked.
         stop: request to stop.
         warnings: what makes the results doubtful.
+        live: live viewer of the tracked frames, if any; no failure of it ends the run.
     """
 
     source: FrameSource
@@ -52,6 +58,7 @@ class TrackingRun:
     ended_early: str = ""
     stop: StopRequest = field(default_factory=StopRequest)
     warnings: tuple[str, ...] = ()
+    live: LiveView | None = None
 
     def go(self, watch: Callable[[Any], None]) -> None:
         """Track to the end; ``watch`` is called with every tracked frame.
@@ -69,10 +76,20 @@ class TrackingRun:
         if failures:
             raise OutputError("; ".join(dict.fromkeys((*failures, self.sink.kept()))))
 
+    def _wait_for_viewer(self) -> None:
+        """Wait until somebody looks, the time for it is over, or a stop is requested."""
+        end = time.monotonic() + (self.live.wait_s if self.live is not None else 0.0)
+        while self.live is not None and not self.stop.is_requested and time.monotonic() < end:
+            if self.live.wait(WAIT_STEP_S):
+                return
+
     def _track(self, watch: Callable[[Any], None]) -> None:
+        self._wait_for_viewer()
         for frame in self.source.frames():
             tracked = self.tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
             self.sink.add(tracked, frame.image)
+            if self.live is not None:
+                self.live.add(tracked, frame.image)
             self.statistics.add(tracked)
             if self.overlay is not None:
                 self.overlay.add(frame.image, tracked, self.tracker.rest)
@@ -93,6 +110,8 @@ class TrackingRun:
                     writer.close()
             except OutputError as error:
                 failures.append(str(error))
+        if self.live is not None:
+            self.live.close()
         return failures
 
 

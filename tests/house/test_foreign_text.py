@@ -44,6 +44,7 @@ READS = {
     },  # the installed code's digest; its own last line
     "cmpdesign/products/mold/processes.py": {"os.fdopen"},  # to write to a process
     "cmpdesign/evaluate/runner.py": {"json.loads"},  # of a text that it just made
+    "cmpdesign/libraries.py": {"read_text", "json.loads"},  # what pip noted beside the installed package
 }
 READING = {
     "os.open", "os.fdopen", "tomllib.loads", "tomllib.load", "json.loads", "json.load", "cv2.imdecode", "cv2.imread",

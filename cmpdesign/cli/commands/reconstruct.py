@@ -16,7 +16,14 @@ from cmpdesign.cli.options.images import (
     PresetOption,
     SideOption,
 )
-from cmpdesign.cli.options.recording import OUTPUT_HELP, FrameIdOption, WithImagesOption
+from cmpdesign.cli.options.recording import (
+    OUTPUT_HELP,
+    FrameIdOption,
+    LiveOption,
+    LivePortOption,
+    LiveWaitOption,
+    WithImagesOption,
+)
 from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
     exit_status,
@@ -86,6 +93,9 @@ def reconstruct(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
     frame_id: FrameIdOption = "tactile",
     with_images: WithImagesOption = False,
+    live: LiveOption = None,
+    live_port: LivePortOption = None,
+    live_wait: LiveWaitOption = 0.0,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -109,7 +119,8 @@ def reconstruct(
     from extractor import load_layout
 
     known = parse_reading_response(response)
-    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, with_images)
+    shown = (with_images, live, live_port, live_wait)
+    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, *shown)
     shape = ShapeOptions(from_rest, flatness_mm, model_px, surface)
     job = ReconstructJob(load_layout(layout), rig, rest, source, output, reading, shape)
     run = job.prepare()

@@ -18,7 +18,14 @@ from cmpdesign.cli.options.images import (
     SourcesArgument,
 )
 from cmpdesign.cli.options.paths import require_suffix
-from cmpdesign.cli.options.recording import OUTPUT_HELP, FrameIdOption, WithImagesOption
+from cmpdesign.cli.options.recording import (
+    OUTPUT_HELP,
+    FrameIdOption,
+    LiveOption,
+    LivePortOption,
+    LiveWaitOption,
+    WithImagesOption,
+)
 from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.run_progress import (
     exit_status,
@@ -74,6 +81,9 @@ def track(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
     frame_id: FrameIdOption = "tactile",
     with_images: WithImagesOption = False,
+    live: LiveOption = None,
+    live_port: LivePortOption = None,
+    live_wait: LiveWaitOption = 0.0,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
     ] = False,
@@ -96,7 +106,8 @@ def track(
     from extractor import load_layout
 
     known = parse_reading_response(response)
-    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, with_images)
+    shown = (with_images, live, live_port, live_wait)
+    reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, *shown)
     job = TrackJob(load_layout(layout), tuple(source), output, reading, rest, mm_per_px, overlay, quiver)
     run = job.prepare()
     print_step(f"{run.source.name} is open")

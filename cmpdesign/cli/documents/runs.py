@@ -46,6 +46,16 @@ class LargestPart(Part):
     marker: int
 
 
+class LivePart(Part):
+    """What a live server did."""
+
+    address: str
+    sent: int = Field(description="Frames.")
+    left_out: int = Field(description="Frames that could not be sent in time.")
+    is_viewer_behind: bool = Field(description="A viewer took fewer messages than were sent to it.")
+    failure: str = Field(description="Why it stopped before the end.")
+
+
 class TrackDocument(Document):
     """The summary of ``track``; also the file FILE.summary.json."""
 
@@ -68,6 +78,7 @@ class TrackDocument(Document):
     jitter_px: float | None = Field(description="Per axis, at rest; null with too few resting frames.")
     jitter_pairs: int
     largest_displacement: LargestPart | None
+    live: LivePart | None = Field(None, description="With --live.")
     written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
 
 
@@ -107,6 +118,7 @@ class ReconstructDocument(Document):
     warnings: tuple[str, ...]
     positions: PositionsPart
     largest_displacement: LargestPart | None
+    live: LivePart | None = Field(None, description="With --live.")
     written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
 
 

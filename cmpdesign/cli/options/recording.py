@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-OUTPUT_HELP = "Table: .npz, .parquet or .csv; or recording: .mcap, or without ending a rosbag2 folder."
+OUTPUT_HELP = "Table: .npz, .parquet or .csv; or recording: .mcap, .rrd, or without ending a rosbag2 folder."
 
 FrameIdOption = Annotated[
     str,
@@ -16,5 +16,26 @@ FrameIdOption = Annotated[
 ]
 
 WithImagesOption = Annotated[
-    bool, typer.Option("--with-images", help="Also record the frames' images, without loss.")
+    bool, typer.Option("--with-images", help="Also record or show the frames' images, without loss.")
+]
+
+LiveOption = Annotated[
+    Literal["foxglove", "rerun"] | None,
+    typer.Option("--live", help="Also show the frames as they come, by a server on this machine."),
+]
+
+LivePortOption = Annotated[
+    int | None,
+    typer.Option(
+        "--live-port",
+        metavar="PORT",
+        help="Port of the server; 0: any. [default: 8765 of Foxglove, 9876 of Rerun]",
+    ),
+]
+
+LiveWaitOption = Annotated[
+    float,
+    typer.Option(
+        "--live-wait", metavar="SECONDS", help="How long the first frame waits for a viewer of Foxglove."
+    ),
 ]

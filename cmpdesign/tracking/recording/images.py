@@ -24,13 +24,28 @@ def keep_images(folder: Path, frame: int, images: Any) -> None:
     Raises:
         OSError: an image cannot be written.
     """
+    for view in (None, *range(len(images) if isinstance(images, list) else 0)):
+        png = png_of(images, view)
+        if png is not None:
+            _image_path(folder, frame, view).write_bytes(png)
+
+
+def png_of(images: Any, view: int | None) -> bytes | None:
+    """One of a frame's images as PNG, compressed for speed; None where there is none.
+
+    Args:
+        images: see ``keep_images``.
+        view: see ``kept_image``.
+    """
     import cv2
 
-    named = enumerate(images) if isinstance(images, list) else [(None, images)]
-    for view, image in named:
-        if isinstance(image, np.ndarray):
-            data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-            _image_path(folder, frame, view).write_bytes(data.tobytes())
+    named: dict[int | None, Any] = {None: images}
+    if isinstance(images, list):
+        named = dict(enumerate(images))
+    image = named.get(view)
+    if not isinstance(image, np.ndarray):
+        return None
+    return bytes(cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1])
 
 
 def kept_image(folder: Path, frame: int, view: int | None) -> bytes | None:

@@ -34,6 +34,7 @@ class Recording:
         frame_id: the coordinate frame in the messages' headers, and the first part of their topics.
         with_images: keep the source's images.
         views: the cameras' views with their intrinsics; empty where the intrinsics are not known.
+        is_image_one_a_view: the source has an image for each view; otherwise one image shows all views.
 
     Raises:
         CmpDesignError: a frame id that cannot stand in a ROS topic.
@@ -42,6 +43,7 @@ class Recording:
     frame_id: str = DEFAULT_FRAME_ID
     with_images: bool = False
     views: tuple[View, ...] = ()
+    is_image_one_a_view: bool = False
 
     def __post_init__(self) -> None:
         if not _FRAME_ID.fullmatch(self.frame_id):
@@ -52,8 +54,8 @@ class Recording:
 
 
 def is_recording(path: Path) -> bool:
-    """True for the name of a recording: it ends in .mcap, or has no ending, for a rosbag2 folder."""
-    return path.suffix in (".mcap", "")
+    """True for the name of a recording: it ends in .mcap or .rrd, or has no ending, for a rosbag2 folder."""
+    return path.suffix in (".mcap", ".rrd", "")
 
 
 class RecordedTable:

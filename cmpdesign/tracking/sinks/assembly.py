@@ -38,10 +38,12 @@ def assemble_table(chunks: Sequence[Chunk], about: Columns, path: Path) -> int:
 def _write_recording(chunks: Sequence[Chunk], about: Columns, path: Path) -> None:
     """Write the frames' messages; images lie beside the chunks."""
     from cmpdesign.tracking.recording.bag import write_recording
+    from cmpdesign.tracking.recording.rrd import write_rrd
 
     if not chunks:
         raise OSError(0, "no frame was tracked")
-    write_recording((read_frames(chunk) for chunk in chunks), about, path, chunks[0].path.parent)
+    write = write_rrd if path.suffix == ".rrd" else write_recording
+    write((read_frames(chunk) for chunk in chunks), about, path, chunks[0].path.parent)
 
 
 def _write_npz(chunks: Sequence[Chunk], about: Columns, path: Path) -> None:

@@ -20,7 +20,7 @@ from cmpdesign.tracking.sinks.csv_recovery import recover_csv
 from cmpdesign.tracking.sinks.csv_sink import CsvSink
 from cmpdesign.tracking.sinks.unfinished import Recovered, part_path, require_pyarrow
 
-KINDS = (".npz", ".parquet", ".csv", ".mcap")
+KINDS = (".npz", ".parquet", ".csv", ".mcap", ".rrd")
 
 
 class FrameSink(Protocol):
@@ -54,7 +54,8 @@ def open_sink(path: Path, table: FrameTable, recording: Recording | None = None)
     _require_kind(path)
     if recording.with_images and not is_recording(path):
         raise CmpDesignError(
-            f"--with-images: {path} is a table and holds no images; give a name that ends in .mcap, or without ending"
+            f"--with-images: {path} is a table and holds no images; "
+            "give a name that ends in .mcap or .rrd, or without ending"
         )
     part = part_path(path)
     if is_folder(path):
@@ -122,8 +123,12 @@ def _require_kind(path: Path) -> None:
         )
     if path.suffix == ".parquet":
         require_pyarrow()
-    if is_recording(path):
-        from cmpdesign.tracking.recording.bag import require_rosbags
+    if path.suffix == ".rrd":
+        from cmpdesign.tracking.recording.rerun_log import require_rerun
+
+        require_rerun()
+    elif is_recording(path):
+        from cmpdesign.tracking.recording.topics import require_rosbags
 
         require_rosbags()
 

@@ -1,0 +1,137 @@
+"""Foxglove's server: the messages of a recording, on the same topics, over a websocket."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
+from cmpdesign.tracking.live.options import HOST
+from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
+from cmpdesign.tracking.recording.topics import TopicMessages
+
+# Messages that wait for one viewer; then the oldest is left out. With images, 4 a frame, some 32 MB.
+BACKLOG_MESSAGES = 256
+CLOSE_S = 0.5  # time for viewers to take what waits for them
+SUBSCRIBE_S = 0.05  # from a viewer's first subscription to its others
+POLL_S = 0.01
+_LOGGER = "foxglove"
+_FULL = "full"  # in the log line of the library of an outbox that is full
+
+
+def require_foxglove() -> Any:
+    """The module foxglove.
+
+    Raises:
+        MissingLibraryError: it is not installed.
+    """
+    with extra("live"):
+        import foxglove
+    return foxglove
+
+
+class FoxgloveServer:
+    """Serves frames.
+
+    Args:
+        frame_id: the coordinate frame of the markers, and the first part of all topics but the diagnostics'.
+        port: a free port on this machine.
+        places: of the images that are shown. All topics exist before a client can connect: to a client that is there
+            already, the library may offer a topic before it takes subscriptions to it.
+
+    Raises:
+        CmpDesignError: a library is not installed, or the port cannot be opened.
+    """
+
+    def __init__(self, frame_id: str, port: int, places: Iterable[ImagePlace] = ()) -> None:
+        self._foxglove, self._messages = require_foxglove(), TopicMessages(frame_id)
+        self._context = self._foxglove.Context()
+        self._channels: dict[str, Any] = {}
+        for topic, kind in self._messages.kinds(places).items():
+            self._channel(topic, kind)
+        self._watch = _watch_log(self._foxglove)
+        try:
+            self._server = self._foxglove.start_server(
+                name=f"cmpdesign: {frame_id}",
+                host=HOST,
+                port=port,
+                context=self._context,
+                message_backlog_size=BACKLOG_MESSAGES,
+            )
+        except RuntimeError as error:
+            raise CmpDesignError(f"--live-port {port}: cannot be opened ({error})") from None
+        self.address = f"ws://{HOST}:{self._server.port}"
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until a viewer has subscribed to a topic."""
+        end = time.monotonic() + seconds
+        while not self._is_watched() and time.monotonic() < end:
+            time.sleep(POLL_S)
+        if self._is_watched():
+            time.sleep(SUBSCRIBE_S)
+        return self._is_watched()
+
+    def _is_watched(self) -> bool:
+        return any(channel.base.has_sinks() for channel in self._channels.values())
+
+    def send(self, frames: Sequence[RecordedFrame]) -> None:
+        for frame in frames:
+            for one in self._messages.of(frame):
+                self._channel(one.topic, one.kind).log(bytes(one.data), log_time=one.ns)
+
+    def is_behind(self) -> bool:
+        return self._watch.is_behind
+
+    def close(self) -> None:
+        if self._is_watched():
+            time.sleep(CLOSE_S)
+        self._server.stop()
+        for channel in self._channels.values():
+            channel.close()
+        logging.getLogger(_LOGGER).removeHandler(self._watch)
+
+    def _channel(self, topic: str, kind: str) -> Any:
+        if topic not in self._channels:
+            text, _ = self._messages.store.generate_msgdef(kind, ros_version=2)
+            schema = self._foxglove.Schema(name=kind, encoding="ros2msg", data=text.encode())
+            self._channels[topic] = self._foxglove.Channel(
+                topic, message_encoding="cdr", schema=schema, context=self._context
+            )
+        return self._channels[topic]
+
+
+class _Watch(logging.Handler):
+    """Hears of viewers whose outbox is full: the library says so in its log alone, and not how often."""
+
+    is_behind = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if "outbox" in record.getMessage() and _FULL in record.getMessage():
+            self.is_behind = True
+
+
+def _watch_log(foxglove: Any) -> _Watch:
+    """Hear the library's log, and keep it off the terminal."""
+    watch, logger = _Watch(), logging.getLogger(_LOGGER)
+    logger.addHandler(watch)
+    logger.propagate = False
+    logger.setLevel(logging.INFO)
+    with _unchanged_root():
+        foxglove.set_log_level("INFO")
+    return watch
+
+
+@contextmanager
+def _unchanged_root() -> Iterator[None]:
+    """The program's own log stays as it is: ``set_log_level`` gives it a handler."""
+    root = logging.getLogger()
+    handlers, level = root.handlers[:], root.level
+    try:
+        yield
+    finally:
+        root.handlers[:] = handlers
+        root.setLevel(level)

@@ -1,0 +1,93 @@
+"""What a live server is, and where it listens."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, get_args
+
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.tracking.recording.frames import RecordedFrame
+
+HOST = "127.0.0.1"  # of this machine alone; there is no other choice, because nobody is asked for a password
+LiveKind = Literal["foxglove", "rerun"]
+# The viewers' own ports.
+PORTS: Mapping[LiveKind, int] = {"foxglove": 8765, "rerun": 9876}
+
+
+@dataclass(frozen=True)
+class Live:
+    """Options of a live server.
+
+    Attributes:
+        kind: the viewer.
+        port: the port on this machine; None: the viewer's own; 0: any that is free.
+        wait_s: how long the first frame waits for a viewer of Foxglove, s.
+
+    Raises:
+        CmpDesignError: no such viewer, no such port, or no such time.
+    """
+
+    kind: LiveKind
+    port: int | None = None
+    wait_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(LiveKind):
+            raise CmpDesignError(f"--live {self.kind!r}: unknown viewer; expected foxglove or rerun")
+        if self.port is not None and not 0 <= self.port < 1 << 16:
+            raise CmpDesignError(
+                f"--live-port {self.port}: expected a number from 0, for any free port, to 65535"
+            )
+        if not 0 <= self.wait_s < float("inf"):
+            raise CmpDesignError(f"--live-wait {self.wait_s:g}: expected a number of seconds from 0")
+        if self.wait_s and self.kind == "rerun":
+            raise CmpDesignError(
+                "--live-wait: Rerun's server keeps the frames for a viewer that comes later; leave it out"
+            )
+
+    def free_port(self) -> int:
+        """The port, which no other program has.
+
+        Raises:
+            CmpDesignError: another program has it.
+        """
+        port = PORTS[self.kind] if self.port is None else self.port
+        try:
+            with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind((HOST, port))
+                free: int = probe.getsockname()[1]
+                return free
+        except OSError as error:
+            raise CmpDesignError(
+                f"--live-port {port}: cannot be opened ({error.strerror or error}); "
+                "end the program that has it, or give another port"
+            ) from None
+
+
+class Server(Protocol):
+    """A server of frames; only one thread calls it.
+
+    Attributes:
+        address: what a viewer opens.
+    """
+
+    address: str
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a viewer; True if there is one."""
+        ...
+
+    def send(self, frames: Sequence[RecordedFrame]) -> None:
+        """Send frames to all viewers; what a viewer does not take in time is left out."""
+        ...
+
+    def is_behind(self) -> bool:
+        """True where a viewer did not take all messages so far."""
+        ...
+
+    def close(self) -> None:
+        """Give viewers a moment to take the last frames, and stop."""
+        ...

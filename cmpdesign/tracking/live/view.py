@@ -1,0 +1,154 @@
+"""Frames handed to a live server by a thread of its own, so that the tracker waits for nobody."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from threading import Condition, Thread
+from typing import Any, NamedTuple
+
+from cmpdesign.tracking.columns import FrameTable
+from cmpdesign.tracking.live.options import Live, Server
+from cmpdesign.tracking.recording.frames import FrameReader, image_places
+from cmpdesign.tracking.recording.images import png_of
+from cmpdesign.tracking.recording.options import RecordedTable, Recording
+
+QUEUE_FRAMES = 32  # that wait for the thread; then the oldest is left out
+AT_ONCE = 4  # frames that the thread takes together
+END_S = 10.0  # for the frames that wait at the end
+
+
+class LiveCount(NamedTuple):
+    """What a live server did.
+
+    Attributes:
+        sent: number of frames that it sent.
+        left_out: number of frames that it left out, because making their messages took longer than tracking.
+        is_viewer_behind: a viewer took fewer messages than were sent to it.
+        failure: why it stopped before the end; "" if it did not.
+    """
+
+    sent: int
+    left_out: int
+    is_viewer_behind: bool
+    failure: str
+
+
+class _Waiting(NamedTuple):
+    frame: Any
+    image: Any
+
+
+class LiveView:
+    """Shows frames while a run goes on. No failure of the server ends the run.
+
+    Args:
+        server: the server.
+        table: makes the frames' columns.
+        with_images: show the images, too.
+        wait_s: how long the first frame waits for a viewer, s.
+
+    Attributes:
+        address: what a viewer opens.
+        wait_s: as given.
+    """
+
+    def __init__(
+        self, server: Server, table: RecordedTable, with_images: bool = False, wait_s: float = 0.0
+    ) -> None:
+        self.wait_s = wait_s
+        self._server, self._table, self._with_images = server, table, with_images
+        self.address = server.address
+        self._reader = FrameReader()
+        self._queue: deque[_Waiting] = deque()
+        self._changed = Condition()
+        self._is_closed = False
+        self._sent, self._left_out, self._failure = 0, 0, ""
+        self._thread = Thread(target=self._work, name="live", daemon=True)
+        self._thread.start()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a viewer, before the first frame is handed over; True if there is one."""
+        return self._server.wait(seconds)
+
+    def add(self, frame: Any, image: Any = None) -> None:
+        """Hand over a tracked frame and its image, which nobody changes from now on; returns at once."""
+        with self._changed:
+            self._queue.append(_Waiting(frame, image if self._with_images else None))
+            if len(self._queue) > QUEUE_FRAMES:
+                self._queue.popleft()
+                self._left_out += 1
+            self._changed.notify()
+
+    def waiting(self) -> int:
+        """The number of frames that wait for the thread."""
+        return len(self._queue)
+
+    def close(self) -> LiveCount:
+        """Send what waits, and stop the server; calls after the first one change nothing."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify()
+        self._thread.join(END_S)
+        return self.count()
+
+    def count(self) -> LiveCount:
+        """What was sent so far."""
+        return LiveCount(self._sent, self._left_out, self._server.is_behind(), self._failure)
+
+    def _work(self) -> None:
+        """Runs in the thread. What the viewer's library raises is not known in advance, and must not end the run."""
+        try:
+            while some := self._next():
+                self._send(some)
+        except Exception as error:
+            self._failure = f"{type(error).__name__}: {error}"
+        try:
+            self._server.close()
+        except Exception as error:
+            self._failure = self._failure or f"{type(error).__name__}: {error}"
+
+    def _next(self) -> list[_Waiting]:
+        """The frames that wait; without any, the next one; empty at the end."""
+        with self._changed:
+            while not self._queue and not self._is_closed:
+                self._changed.wait()
+            return [self._queue.popleft() for _ in range(min(AT_ONCE, len(self._queue)))]
+
+    def _send(self, some: Sequence[_Waiting]) -> None:
+        pictures = {one.frame.index: one.image for one in some}
+
+        def image_of(number: int, view: int | None) -> bytes | None:
+            return png_of(pictures[number], view)
+
+        columns, about = self._table.batch([one.frame for one in some]), self._table.about()
+        self._server.send(list(self._reader.frames(columns, about, image_of)))
+        self._sent += len(some)
+
+
+def open_view(live: Live, table: FrameTable, recording: Recording) -> LiveView:
+    """Start a server and the thread that feeds it.
+
+    Args:
+        live: the server's options.
+        table: the frames' columns.
+        recording: what is shown; its images as they would be recorded.
+
+    Raises:
+        CmpDesignError: a library is not installed, or the port cannot be opened.
+    """
+    shown = RecordedTable(table, recording)
+    server: Server
+    if live.kind == "foxglove":
+        from cmpdesign.tracking.live.foxglove_server import FoxgloveServer, require_foxglove
+
+        require_foxglove()
+        places = image_places(shown.about(), recording.is_image_one_a_view) if recording.with_images else ()
+        server = FoxgloveServer(recording.frame_id, live.free_port(), places)
+    else:
+        from cmpdesign.tracking.live.rerun_server import RerunServer
+        from cmpdesign.tracking.recording.rerun_log import require_rerun
+
+        require_rerun()
+        server = RerunServer(recording.frame_id, live.free_port())
+    return LiveView(server, shown, recording.with_images, live.wait_s)

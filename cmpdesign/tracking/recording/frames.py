@@ -1,0 +1,193 @@
+"""A frame as recordings and live viewers show it: its time, its markers as records, how it was read, its images."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cmpdesign.errors import InputError
+from cmpdesign.files.image_header import size_in_header
+from cmpdesign.tracking.columns import FRAME_STATUS, Columns
+from cmpdesign.tracking.recording.messages import ERROR, OK, WARN, Lens
+from cmpdesign.tracking.recording.options import QUALITY
+from cmpdesign.tracking.recording.points import Records, marker_records
+
+NS_PER_S = 10**9
+STEP_NS = NS_PER_S // 30  # from the frame before to a frame whose time the source does not know
+_STATUS_NAMES = ("lost", "measured", "repaired", "fitted")
+
+# (frame number, view) -> PNG, or None; the view is None for the image with all views.
+ImagesOf = Callable[[int, int | None], bytes | None]
+
+
+class CameraView(NamedTuple):
+    """A view that an image shows: the first part of its topics, and its intrinsics."""
+
+    base: str
+    lens: Lens
+
+
+class ImagePlace(NamedTuple):
+    """The first part of an image's topics, without "/" before it, and the views that it shows."""
+
+    base: str
+    views: tuple[CameraView, ...]
+
+
+@dataclass(frozen=True)
+class FrameImage:
+    """An image of a frame.
+
+    Attributes:
+        base: the first part of its topics, without "/" before it.
+        png: the file's bytes.
+        size_px: (width, height).
+        views: what is known of the cameras of the views that the image shows.
+    """
+
+    base: str
+    png: bytes
+    size_px: tuple[int, int]
+    views: tuple[CameraView, ...]
+
+    @property
+    def frame_id(self) -> str:
+        """The camera's coordinate frame."""
+        return f"{self.base.replace('/', '_')}_camera"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFrame:
+    """A frame.
+
+    Attributes:
+        number: of the source.
+        ns: its time, ns.
+        markers: (M,) records, see ``marker_records``.
+        level: OK, WARN or ERROR.
+        text: the frame's status, its reason and the hints.
+        values: what its diagnostics list; numbers as text, "nan" where unknown.
+        images: the images that are recorded or shown.
+    """
+
+    number: int
+    ns: int
+    markers: Records
+    level: int
+    text: str
+    values: dict[str, str]
+    images: tuple[FrameImage, ...]
+
+
+class FrameReader:
+    """Makes frames from columns; the frames' times go on from chunk to chunk."""
+
+    def __init__(self) -> None:
+        self._last_ns = -STEP_NS
+
+    def frames(self, columns: Columns, about: Columns, images_of: ImagesOf) -> Iterator[RecordedFrame]:
+        """The frames of a chunk.
+
+        Args:
+            columns: the columns of frames of a ``RecordedTable``.
+            about: its shared columns.
+            images_of: gives the images.
+        """
+        records = marker_records(columns, about)
+        views = [str(name) for name in about["view_names"]]
+        for place, number in enumerate(columns["frame"].tolist()):
+            row = {name: values[place] for name, values in columns.items()}
+            level, text = _judge(row)
+            yield RecordedFrame(
+                number,
+                self._time_ns(float(row["time_s"])),
+                records[place],
+                level,
+                text,
+                _diagnostic_values(row, records["status"][place], views),
+                tuple(_frame_images(number, about, images_of)),
+            )
+
+    def _time_ns(self, time_s: float) -> int:
+        """A frame's time; of a frame without one, some time after the frame before."""
+        known = np.isfinite(time_s)
+        self._last_ns = max(0, round(time_s * NS_PER_S)) if known else self._last_ns + STEP_NS
+        return self._last_ns
+
+
+def image_places(about: Columns, is_one_a_view: bool) -> list[ImagePlace]:
+    """Where the images of all frames stand.
+
+    Args:
+        about: the shared columns of a ``RecordedTable``.
+        is_one_a_view: the source has an image for each view; otherwise one image shows all views.
+    """
+    return [_place(view, about) for view in (range(len(about["view_names"])) if is_one_a_view else [None])]
+
+
+def _place(view: int | None, about: Columns) -> ImagePlace:
+    frame_id = str(about["frame_id"])
+    base = frame_id if view is None else f"{frame_id}/{_topic_name(str(about['view_names'][view]))}"
+    return ImagePlace(base, tuple(_views_in(view, base, about)))
+
+
+def _frame_images(number: int, about: Columns, images_of: ImagesOf) -> Iterator[FrameImage]:
+    for view in (None, *range(len(about["view_names"]))):
+        png = images_of(number, view)
+        if png is not None:
+            place = _place(view, about)
+            yield FrameImage(place.base, png, _size_px(png), place.views)
+
+
+def _views_in(view: int | None, base: str, about: Columns) -> Iterator[CameraView]:
+    """The views that an image shows: a view of its own, or all."""
+    names = [str(name) for name in about["view_names"]]
+    if not names:
+        yield CameraView(base, Lens())
+    for k in range(len(names)) if view is None else [view]:
+        lens = Lens(*(about[f"view_{name}"][k].tolist() for name in Lens._fields))
+        is_one_of_many = view is None and len(names) > 1
+        yield CameraView(f"{base}/{_topic_name(names[k])}" if is_one_of_many else base, lens)
+
+
+def _size_px(png: bytes) -> tuple[int, int]:
+    size = size_in_header(png)
+    if size is None:
+        raise InputError("a kept image has no size")
+    return size[0], size[1]
+
+
+def _topic_name(view: str) -> str:
+    """A view's name as a part of a topic."""
+    name = re.sub(r"\W", "_", view, flags=re.ASCII)
+    return name if name[:1].isalpha() else f"view_{name}"
+
+
+def _judge(row: dict[str, Any]) -> tuple[int, str]:
+    """Level and text of a frame: an error where it is not tracked, a warning where something limits it."""
+    status, reason, hints = FRAME_STATUS[row["frame_status"]], str(row["reason"]), str(row["hints"])
+    notes = "; ".join(note for note in (reason, hints) if note)
+    level = ERROR if status != "tracked" else WARN if notes else OK
+    return level, f"{status}: {notes}" if notes else status
+
+
+def _diagnostic_values(row: dict[str, Any], statuses: Any, views: list[str]) -> dict[str, str]:
+    """What a DiagnosticStatus lists of a frame; numbers as text, "nan" where unknown."""
+    counts = np.bincount(statuses, minlength=len(_STATUS_NAMES)).tolist()
+    values = {
+        "frame": str(row["frame"]),
+        "frame_status": FRAME_STATUS[row["frame_status"]],
+        "reason": str(row["reason"]),
+        "elapsed_ms": f"{row['elapsed_ms']:.3f}",
+    }
+    if "start" in row:
+        values["start"] = str(row["start"])
+    values |= {f"markers_{name}": str(count) for name, count in zip(_STATUS_NAMES, counts, strict=True)}
+    for name, numbers in zip(views or [""], row["quality"], strict=True):
+        before = f"{name}." if len(views) > 1 else ""
+        values |= {f"{before}{key}": f"{v:.6g}" for key, v in zip(QUALITY, numbers.tolist(), strict=True)}
+    return values
