@@ -81,10 +81,6 @@ def seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - started
 
 
-def no_watch(done: int, wanted: int) -> None:
-    """Show nothing."""
-
-
 def small_plan(folder: Path, shards: int) -> Path:
     """The shipped plan with few frames."""
     text = find_plan("pressed-objects").read_text(encoding="utf-8")
@@ -107,7 +103,7 @@ def measure_rendering(folder: Path, shards: int) -> Rates:
     times = [
         seconds(
             lambda count=count: make_dataset(  # type: ignore[misc]
-                plan, folder / f"data{count}", ShardRange(), Scheduler(workers=count), no_watch
+                plan, folder / f"data{count}", ShardRange(), Scheduler(workers=count)
             )
         )
         for count in (1, 2)
@@ -134,7 +130,7 @@ def measure_extraction(folder: Path, shards: int) -> Rates:
     times, frames = [], 0
     for count in (1, 2):
         out = folder / f"markers{count}"
-        options = (Reading(), Scheduler(workers=count), no_watch, 4 * FRAMES_A_SHARD)
+        options = (Reading(), Scheduler(workers=count), 4 * FRAMES_A_SHARD)
         times.append(seconds(lambda: extract_markers(layout, videos, out, *options)))  # noqa: B023
         frames = len(load(out))
     return Rates("extracted", frames, frames / times[0], frames / times[1])

@@ -16,6 +16,7 @@ from cmpdesign.data.folder import Record, finished_records, number_of_shards, re
 from cmpdesign.errors import InputError
 from cmpdesign.files.images import Image, ImageFileError, decode_bytes
 from cmpdesign.inputs.documents import parse_json
+from cmpdesign.libraries import extra
 from extractor import Reference, load_layout
 
 # Columns that are arrays of V views -> numbers a marker.
@@ -106,7 +107,8 @@ class DataSet:
         Raises:
             InputError: no such column or shard.
         """
-        import pyarrow
+        with extra("data"):
+            import pyarrow
 
         wanted = self.shards if shards is None else tuple(shards)
         tables = [self._read_table(shard, columns) for shard in wanted]
@@ -163,7 +165,8 @@ class DataSet:
         return self.folder / name
 
     def _read_table(self, shard: int, columns: Sequence[str] | None) -> Any:
-        import pyarrow.parquet
+        with extra("data"):
+            import pyarrow.parquet
 
         path = self._path(shard, "tables")
         if columns is None:
@@ -201,7 +204,8 @@ def _shaped(name: str, flat: NDArray[Any], views: int) -> NDArray[Any]:
 
 
 def _read_whole_table(path: Path) -> Any:
-    import pyarrow.parquet
+    with extra("data"):
+        import pyarrow.parquet
 
     return pyarrow.parquet.read_table(path, partitioning=None).combine_chunks()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks import accuracy, extraction
+from benchmarks import accuracy, dataset, extraction
 from benchmarks.camera import page as camera
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.pooled import PooledResult
@@ -60,6 +60,7 @@ def pages() -> dict[Path, str]:
         blocks
         | accuracy.documentation_blocks(precise)
         | extraction.markdown(read_measured("extraction"))
+        | dataset.markdown(read_measured("dataset"))
         | camera.documentation_blocks(read_measured("camera"))
     )
 

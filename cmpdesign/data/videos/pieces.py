@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cmpdesign.inputs.sources import SourceError
+from cmpdesign.libraries import extra
 
 START = -(1 << 62)  # of the first piece
 END = 1 << 62  # of the last piece
@@ -138,7 +139,8 @@ def _unstamped_frames(path: Path) -> Iterator[_Decoded]:
 
 def _seek(container: Any, stream: Any, start: int) -> None:
     """Go to the key frame of a stamp, or before it; to the beginning of a file that cannot be sought in."""
-    import av
+    with extra("data"):
+        import av
 
     try:
         container.seek(start, stream=stream, backward=True)
@@ -151,7 +153,8 @@ def _seek(container: Any, stream: Any, start: int) -> None:
 
 def _packets(container: Any) -> Iterator[Any]:
     """The packets with frames that are shown, up to where the file is damaged."""
-    import av
+    with extra("data"):
+        import av
 
     with suppress(av.FFmpegError):
         for packet in container.demux(container.streams.video[0]):
@@ -161,7 +164,8 @@ def _packets(container: Any) -> Iterator[Any]:
 
 def _decoded(stream: Any, packet: Any) -> list[Any]:
     """The frames that a packet completes; none of a damaged packet."""
-    import av
+    with extra("data"):
+        import av
 
     try:
         frames = stream.codec_context.decode(packet)
@@ -177,7 +181,8 @@ def _seconds(stream: Any, stamp: int) -> float:
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     """A container with one video, decoded by one thread: the processes share the cores."""
-    import av
+    with extra("data"):
+        import av
 
     try:
         container = av.open(str(path))
