@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks import accuracy, dataset, extraction
+from benchmarks import accuracy, extraction
 from benchmarks.camera import page as camera
+from benchmarks.datasets import run as datasets
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.pooled import PooledResult
 from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture, pooled_markdown
@@ -60,7 +61,7 @@ def pages() -> dict[Path, str]:
         blocks
         | accuracy.documentation_blocks(precise)
         | extraction.markdown(read_measured("extraction"))
-        | dataset.markdown(read_measured("dataset"))
+        | datasets.markdown(read_measured("datasets"))
         | camera.documentation_blocks(read_measured("camera"))
     )
 

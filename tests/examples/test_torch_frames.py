@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cmpdesign.data import load
-from tests.support.datasets import make_serially, write_plan
+from tests.support.made.datasets import make_serially, write_plan
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "torch_frames.py"
 SHARDS = 3

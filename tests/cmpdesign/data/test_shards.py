@@ -24,7 +24,7 @@ from cmpdesign.reading.read_layout import layout_from_reference
 from cmpdesign.scene import render
 from cmpdesign.scene.files.scene_file import scene_from_document
 from tests.support.command import refused, run
-from tests.support.datasets import contents, make_serially, write_plan
+from tests.support.made.datasets import contents, make_serially, write_plan
 
 
 @pytest.fixture(scope="module")

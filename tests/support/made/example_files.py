@@ -15,9 +15,9 @@ from cmpdesign.files.images import read_image
 from cmpdesign.products.laser.coupon.design import coupon_to_json, design_coupon
 from cmpdesign.products.laser.setup import complete_setup
 from tests.support.command import run
-from tests.support.datasets import write_plan
 from tests.support.laser_tools import coupon_photo
 from tests.support.layouts import small_text
+from tests.support.made.datasets import write_plan
 from tests.support.made.rest_pictures import nominal_layout, write_rest_images
 from tests.support.tracking.press import write_press
 from tests.support.tracking.scenes import LAYERS, moving

@@ -1,6 +1,6 @@
 """How fast data sets are made and read, on one and on two workers, and how large they are.
 
-    python -m benchmarks.dataset [--quick] [--json FILE] [--publish]
+    python -m benchmarks.datasets [--quick] [--json FILE] [--publish]
 
 "rendered": the shipped plan pressed-objects: every frame is drawn, its contact solved, rendered, encoded as JPEG and
 read. "extracted": the same pictures as videos (FFV1, 640 x 480 px), decoded and read. Frames a second are those of the
@@ -240,7 +240,7 @@ def markdown(results: Mapping[str, Any]) -> dict[str, str]:
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print the tables, write the JSON file if asked."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.dataset", description=(__doc__ or "").split("\n")[0]
+        prog="python -m benchmarks.datasets", description=(__doc__ or "").split("\n")[0]
     )
     parser.add_argument("--quick", action="store_true", help="few frames: a look, no figures to quote")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure, too")
@@ -266,7 +266,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.json:
         write_json(options.json, results)
     if options.publish:
-        for path in write_published("dataset", results, markdown(results)):
+        for path in write_published("datasets", results, markdown(results)):
             console.print(f"wrote {path}")
     return 0
 
