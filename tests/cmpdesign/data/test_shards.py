@@ -16,9 +16,10 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from cmpdesign import OutputError
+from cmpdesign import CmpDesignError, InputError, OutputError
 from cmpdesign.data import load
 from cmpdesign.data.folder import write_manifest
+from cmpdesign.data.schedule.processes import installed_versions, require_versions
 from cmpdesign.data.shard import make_shard
 from cmpdesign.reading.read_layout import layout_from_reference
 from cmpdesign.scene import render
@@ -210,3 +211,28 @@ def test_a_changed_plan_is_noticed(made: Path, tmp_path: Path) -> None:
     plan = folder / "plan.json"
     plan.write_text(plan.read_text(encoding="utf-8").replace('"seed": 0', '"seed": 1'), encoding="utf-8")
     assert "plan.json: was changed" in refused("dataset", write_plan(tmp_path), "-o", folder)
+
+
+def test_damage_is_told_with_what_helps(made: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    shutil.copytree(made, folder)
+    (folder / "tables" / "000001.parquet").write_bytes(b"no table")
+    with pytest.raises(InputError, match=r"000001.parquet: cannot be read \(.*make the shard again"):
+        load(folder)[2]
+    (folder / "images" / "000000.tar").write_bytes(b"no tar" * 200)
+    with pytest.raises(InputError, match=r"000000.tar: is no tar file"):
+        load(folder)[0]
+    for text in ("{}", "[1]", "no JSON", '{"plan": "other", "shards": [{"shard": "../../x"}]}'):
+        (folder / "manifest.json").write_text(text, encoding="utf-8")
+        assert load(folder).shards == ()
+    shutil.copy(made / "manifest.json", folder)
+    assert load(folder).shards == (0, 1)
+    with pytest.raises(CmpDesignError, match=r"holds no plan.json; give the folder of cmpdesign dataset"):
+        load(tmp_path)
+
+
+def test_a_worker_with_other_versions_is_refused() -> None:
+    versions = installed_versions()
+    require_versions(versions)
+    with pytest.raises(CmpDesignError, match=r"a worker has numpy .*, this program 0\.1; install the same"):
+        require_versions(versions | {"numpy": "0.1"})
