@@ -22,11 +22,20 @@ EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["p
 NOT_OF_USERS = ("all", "bench", "dev")
 # Modules of another name than their distribution.
 MODULES = {"cadquery-ocp-novtk": "OCP", "foxglove-sdk": "foxglove", "rerun-sdk": "rerun"}
-BROUGHT = {
-    name: {MODULES.get(wanted, wanted) for line in lines for wanted in re.findall(r"^[A-Za-z0-9._-]+", line)}
-    for name, lines in EXTRAS.items()
-    if name not in NOT_OF_USERS
-}
+
+
+def brought_modules(name: str) -> frozenset[str]:
+    """The modules that an extra brings, with those of the extras that it names."""
+    found: set[str] = set()
+    for line in EXTRAS[name]:
+        if own := re.fullmatch(r"cmpdesign\[(.*)\]", line):
+            found |= frozenset().union(*map(brought_modules, own[1].split(",")))
+        else:
+            found |= {MODULES.get(wanted, wanted) for wanted in re.findall(r"^[A-Za-z0-9._-]+", line)}
+    return frozenset(found)
+
+
+BROUGHT = {name: brought_modules(name) for name in EXTRAS if name not in NOT_OF_USERS}
 LIBRARIES = frozenset().union(*BROUGHT.values())
 
 

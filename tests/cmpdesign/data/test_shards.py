@@ -124,6 +124,19 @@ def test_jpeg_keeps_the_resolution_of_color(tmp_path: Path) -> None:
     assert np.isfinite(load(folder)[0].arrays["xy_px"]).mean() > 0.8
 
 
+def test_contacts_beyond_the_strain_are_drawn_anew(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path, frames=2)
+    text = plan.read_text(encoding="utf-8")
+    plan.write_text(text.replace("frames = 2", "largest_strain = 0.2\nframes = 2", 1), encoding="utf-8")
+    frames = load(make_serially(plan, tmp_path / "data"))
+    assert all(frame.values["largest_strain"] <= 0.2 for frame in frames)
+    assert sum(frame.values["redrawn"] for frame in frames) > 0
+    plan.write_text(text.replace("frames = 2", "largest_strain = 1e-6\nframes = 2", 1), encoding="utf-8")
+    line = refused("dataset", plan, "-o", tmp_path / "none", "--workers", 1)
+    assert "frame 0: none of 20 draws can be rendered" in line and "the plan's limit 1e-06" in line
+    assert "narrow the plan's ranges" in line and not list((tmp_path / "none").glob("*/0*"))
+
+
 def test_places_and_iteration_agree(made: Path) -> None:
     frames = load(made)
     assert len(frames) == 4 and frames.complete and frames.shards == (0, 1)
