@@ -36,7 +36,7 @@ from cmpdesign.files.images import to_png
 from cmpdesign.tracking.export.video import Codec, CodecVideo
 from extractor import load_layout
 
-FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 32, 2
+FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 16, 2
 VIDEOS, REPEATS = 2, 4  # every picture is in the videos several times
 EMPTY_SHARDS = 200
 MILLIONS = 10
