@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import resource
 import shutil
 import tarfile
@@ -122,6 +123,38 @@ def test_jpeg_keeps_the_resolution_of_color(tmp_path: Path) -> None:
     start = data.index(b"\xff\xc0") + 10  # of the frame header: components of id, sampling, table
     assert [data[start + 3 * k + 1] for k in range(3)] == [0x11] * 3
     assert np.isfinite(load(folder)[0].arrays["xy_px"]).mean() > 0.8
+
+
+VIEWS = """
+[[scene.view]]
+distance_mm = 40
+field_of_view_deg = 30
+tilt_deg = {tilt}
+back = true
+area_px = [{x}, 0, 200, 180]
+"""
+
+
+def test_two_views_in_one_picture_are_read_each(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path, frames=1, frames_a_shard=1)
+    text = plan.read_text(encoding="utf-8").replace("[200, 180]", "[400, 180]")
+    text = re.sub(r"\[scene.camera\]\n.*\n", "", text)
+    views = "".join(VIEWS.format(tilt=tilt, x=x) for tilt, x in ((15, 0), (-15, 200)))
+    plan.write_text(text + views, encoding="utf-8")
+    (frame,) = load(make_serially(plan, tmp_path / "data"))
+    assert frame.values["views"] == 2 and frame.image.shape == (180, 400, 3)
+    assert {name: values.shape for name, values in frame.arrays.items()} == {
+        "rest_xy_px": (2, 37, 2),
+        "true_xy_px": (2, 37, 2),
+        "visible": (2, 37),
+        "true_xyz_mm": (37, 3),
+        "xy_px": (2, 37, 2),
+        "cov_px2": (2, 37, 3),
+        "status": (2, 37),
+    }
+    error_px = frame.arrays["xy_px"] - frame.arrays["true_xy_px"]
+    assert frame.values["reason"] == ["", ""] and np.nanmax(np.abs(error_px)) < 0.5
+    assert (frame.arrays["xy_px"][0, :, 0] < 200).all() and (frame.arrays["xy_px"][1, :, 0] > 200).all()
 
 
 def test_contacts_beyond_the_strain_are_drawn_anew(tmp_path: Path) -> None:
