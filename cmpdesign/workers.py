@@ -41,8 +41,11 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             yield pool
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
-            for process in set(active_children()) - others:
+            mine = set(active_children()) - others
+            for process in mine:
                 process.kill()
+            for process in mine:  # until it is gone, a process holds the locks of its files
+                process.join()
             raise
 
 
