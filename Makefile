@@ -16,7 +16,7 @@ ifeq ($(shell command -v $(CXX) || command -v g++ || command -v clang++),)
   TOOLCHAIN := CMAKE_TOOLCHAIN_FILE=$(CURDIR)/cmake/zig.cmake
 endif
 
-.PHONY: help setup demo test test-all test-sanitized lint bench figures lock wheel clean
+.PHONY: help setup demo test test-all test-sanitized lint bench figures docs lock wheel clean
 
 help:
 	@echo "make demo      build a design, render a pressed sample, read it back, print the figures (out/)"
@@ -27,6 +27,7 @@ help:
 	@echo "make lint      ruff and mypy"
 	@echo "make bench     every figure that the documentation states"
 	@echo "make figures   every picture and generated page of docs/"
+	@echo "make docs      the documentation as a site, links checked (build/site)"
 	@echo "make setup     .venv with everything, in the versions of requirements.lock (the others call it)"
 	@echo "make lock      requirements.lock anew, from what is installed in .venv"
 
@@ -66,6 +67,7 @@ lint: $(READY) $(CORE)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(SOURCES))
 	@$(BIN)/mypy
+	@$(BIN)/mypy examples
 
 bench: $(READY) $(CORE)
 	@set -e; for name in extraction accuracy comparison; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done
@@ -74,6 +76,10 @@ bench: $(READY) $(CORE)
 
 figures: $(READY) $(CORE)
 	@$(BIN)/python -m docs.figures
+
+docs: $(READY)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "build/site/index.html"
 
 lock: $(READY) $(CORE)
 	@$(BIN)/python -m tools.lock

@@ -7,6 +7,7 @@ Whatever a command does is one call by the same name:
     cmpdesign.render(design.layout, noise=2)        a picture with its exact truth
     cmpdesign.verify("layout.json", "photo.png")    a picture judged; extractor.Extractor reads without judging
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
+    cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
     cmpdesign.kerf, calibrate_pattern, run_experiment, export_lerobot, export_zarr
 
 The rooms of the package, each of which imports only rooms above it, left column first:
@@ -16,7 +17,8 @@ The rooms of the package, each of which imports only rooms above it, left column
     layout    markers, cells, edges; checks        proposal  a design for a camera
     files     layout.json, images, videos          tracking  markers of videos and cameras as tables
     products  drawings, lasers, molds, prints      evaluate  the article's experiments, simulated
-    reading   layouts and pictures verified        api, cli  the calls, and the command line
+    reading   layouts and pictures verified        data      data sets made on many machines
+                                                   api, cli  the calls, and the command line
 
 Public names are loaded at their first use, so that ``import cmpdesign`` takes milliseconds.
 """
@@ -27,6 +29,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cmpdesign.api.datasets import dataset as dataset
+    from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
     from cmpdesign.api.designs import load as load
     from cmpdesign.api.designs import load_design as load_design
@@ -78,8 +82,10 @@ _HOMES = {
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_pattern": "cmpdesign.api.workshop",
     "check_design": "cmpdesign.layout.checks",
+    "dataset": "cmpdesign.api.datasets",
     "export_lerobot": "cmpdesign.api.workshop",
     "export_zarr": "cmpdesign.api.workshop",
+    "extract": "cmpdesign.api.datasets",
     "kerf": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
     "load": "cmpdesign.api.designs",

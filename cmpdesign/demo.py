@@ -48,11 +48,11 @@ class DemoScore:
 
 def score_markers(markers: Markers, truth: Truth) -> DemoScore:
     """Compare an extraction with the scene's truth."""
-    from scipy.spatial import cKDTree
+    from extractor.numeric.nearest_points import nearest_points
 
     status = markers.status
     found = np.flatnonzero(np.isfinite(markers.xy_px).all(axis=1))
-    nearest = cKDTree(truth.marker_xy_px).query(markers.xy_px[found])[1]
+    nearest = nearest_points(truth.marker_xy_px, markers.xy_px[found])[:, 0]
     measured = status == 1
     error = markers.xy_px[measured] - truth.marker_xy_px[measured]
     visible = status[truth.visible]

@@ -23,7 +23,7 @@ from extractor import Tracked, Tracker, load_layout
 
 @CameraConfig.register_subclass("cmpdesign_tactile")
 @dataclass(kw_only=True)
-class TactileCameraConfig(CameraConfig):
+class TactileCameraConfig(CameraConfig):  # type: ignore[misc]
     """Options of the camera.
 
     Attributes:
@@ -35,7 +35,7 @@ class TactileCameraConfig(CameraConfig):
     layout: str = "layout.json"
 
 
-class TactileCamera(Camera):
+class TactileCamera(Camera):  # type: ignore[misc]
     """Reads the sensor's camera and follows its markers.
 
     Attributes:

@@ -31,7 +31,7 @@ TYPES = {
 }
 
 
-class MarkerNode(Node):
+class MarkerNode(Node):  # type: ignore[misc]
     """Publishes the markers of every image; the first one in which the pattern is found is the rest frame."""
 
     def __init__(self) -> None:

@@ -2,7 +2,7 @@
 
     python examples/sensor_housing.py housing.step
 
-writes the housing and the pad in it. It needs build123d: pip install "cmpdesign[cad]".
+writes the housing and the pad in it. It needs build123d: pip install '.[cad]'.
 """
 
 from __future__ import annotations

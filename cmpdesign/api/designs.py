@@ -34,9 +34,9 @@ class Design(Parameters):
     >>> design.write("out", products=["laser", "mold"])   # a laser job, a casting mold
     >>> design.changed(layers=9)                          # another design; this one does not change
 
-    Every parameter is an attribute, such as ``design.pitch_mm``; docs/design-files.md has them all. Lengths are in mm,
-    or texts such as "60mil". A size is given as ``pitch_mm`` and ``layers``; ``width_mm`` and/or ``height_mm`` and
-    ``layers``; these and ``pitch_mm``; or ``pitch_mm`` and a clip outline.
+    Every parameter is an attribute, such as ``design.pitch_mm``; docs/reference/design-files.md has them all. Lengths
+    are in mm, or texts such as "60mil". A size is given as ``pitch_mm`` and ``layers``; ``width_mm`` and/or
+    ``height_mm`` and ``layers``; these and ``pitch_mm``; or ``pitch_mm`` and a clip outline.
 
     Raises:
         DesignError: an unknown, missing, impossible or contradictory parameter.

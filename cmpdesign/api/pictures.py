@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -276,7 +276,11 @@ class VerifyOptions(TypedDict, total=False):
 
 
 def verify(
-    layout: LayoutLike | AnyLayout, image: str | Path | NDArray[Any], **options: Unpack[VerifyOptions]
+    layout: LayoutLike | AnyLayout,
+    image: str | Path | NDArray[Any],
+    *,
+    report: str | Path | None = None,
+    **options: Unpack[VerifyOptions],
 ) -> Verdict | SheetVerdict:
     """Extract a picture and judge it, as the command ``verify`` does: numbering, colors, share, side.
 
@@ -288,6 +292,8 @@ def verify(
     Args:
         layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
         image: a file, or (H, W, 3) uint8 or uint16.
+        report: file (.zip) that bundles picture, layout, settings and stages: what to send with a picture that is not
+            read; None: no file.
         options: see ``Verifier``.
 
     Returns:
@@ -296,5 +302,51 @@ def verify(
     Raises:
         ImageFileError: a file or an array that is no color picture.
         CmpDesignError: ``min_share`` is not from 0 to 1.
+        OutputError: the report cannot be written.
     """
-    return Verifier(reference_from(layout), **options).verify(image)
+    verifier = Verifier(reference_from(layout), **options)
+    verdict = verifier.verify(image)
+    if report is not None:
+        _write_report(verifier, _layout_text(layout), image, verdict, Path(report))
+    return verdict
+
+
+def _write_report(
+    verifier: Verifier,
+    layout_text: str,
+    image: str | Path | NDArray[Any],
+    verdict: Verdict | SheetVerdict,
+    report: Path,
+) -> None:
+    """Write the bundle of one picture; an array is kept as PNG."""
+    from cmpdesign.files.images import to_png
+    from cmpdesign.inputs.files import read_file
+    from cmpdesign.reading.problem_report import ProblemReport
+    from cmpdesign.reading.verify import Verdict
+    from extractor.draw import draw_stages
+
+    settings = {
+        "preset": verifier.preset,
+        "response": None if verifier.response is None else str(verifier.response),
+        "channels": verifier.channels,
+        "min_share": verifier.min_share,
+    }
+    bundle = ProblemReport(layout_text, settings)
+    if isinstance(image, str | Path):
+        name, content = Path(image).name, read_file(image)
+    else:
+        name, content = "picture.png", to_png(image)
+    stages: Mapping[str, NDArray[Any]] = {}
+    if isinstance(verdict, Verdict):
+        stages = draw_stages(verifier.read(image), verifier.reference, verdict.markers)
+    bundle.add(name, content, verdict.to_json(), stages)
+    bundle.write(report)
+
+
+def _layout_text(layout: LayoutLike | AnyLayout) -> str:
+    """The text of a layout file as it is, or as a layout is written."""
+    if isinstance(layout, str | Path):
+        from cmpdesign.inputs.files import read_text
+
+        return read_text(layout)
+    return layout_from(layout).to_json()

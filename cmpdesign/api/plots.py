@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api.layouts import layout_from
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import BLACK, COLORS
 
 if TYPE_CHECKING:
@@ -31,9 +32,10 @@ def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = F
         The axes.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
-    from matplotlib.collections import PolyCollection
+    with extra("evaluate"):
+        from matplotlib.collections import PolyCollection
 
     axes, pattern = _axes(ax), layout_from(layout)
     outline = PolyCollection([pattern.outline_mm], facecolors=[pattern.palette[COLORS[BLACK]]])
@@ -61,7 +63,7 @@ def plot_markers(image: NDArray[Any], markers: Markers, ax: Any = None) -> Any:
         The axes, in px, y down.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     import numpy as np
 
@@ -92,7 +94,7 @@ def plot_displacement(run: Run, frame: int = -1, ax: Any = None, *, magnified: f
 
     Raises:
         CmpDesignError: no such frame.
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     if not -len(run) <= frame < len(run):
         raise CmpDesignError(f"frame is {frame}; the run has the frames 0 to {len(run) - 1}")
@@ -125,7 +127,7 @@ def plot_history(run: Run, markers: list[int] | None = None, ax: Any = None) -> 
         The axes: mm over s.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     import numpy as np
 
@@ -143,6 +145,7 @@ def plot_history(run: Run, markers: list[int] | None = None, ax: Any = None) -> 
 
 
 def _axes(ax: Any) -> Any:
-    from matplotlib import pyplot
+    with extra("evaluate"):
+        from matplotlib import pyplot
 
     return pyplot.subplots()[1] if ax is None else ax

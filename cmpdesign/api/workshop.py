@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,6 +12,7 @@ from cmpdesign.api.layouts import reference_from
 from cmpdesign.design.design import Design as Parameters
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.watch import tell
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,7 +103,14 @@ def calibrate_pattern(
     ):
         raise CmpDesignError(f"{output}: is the nominal layout itself; give another name")
     names, pictures = _read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
-    learnt = learn_layout(reference_from(layout), pictures, names=names, preset=preset, response=response)
+    learnt = learn_layout(
+        reference_from(layout),
+        pictures,
+        names=names,
+        watch=partial(tell, unit="pictures"),
+        preset=preset,
+        response=response,
+    )
     if output is not None:
         write_layout(layout_from_reference(learnt.layout), Path(output))
     return learnt

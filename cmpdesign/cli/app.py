@@ -10,6 +10,7 @@ from cmpdesign import __version__
 from cmpdesign.cli.command import Command, OneLineErrors, examples, exit_interrupted
 from cmpdesign.cli.commands import build, check, evaluate, kerf, reconstruct, render, size, track, verify
 from cmpdesign.cli.commands.calibrate import group as calibrate
+from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.starting import init, schema, templates
 from cmpdesign.cli.terminal import print_document
@@ -20,7 +21,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # markup would swallow what stands in brackets in a help text
-    help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.",
+    help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.\n\n"
+    "Exit codes: 0 done, and what was judged is good; 1 done, and what was judged is not good; 2 bad input, or a file "
+    "that cannot be written; 130 stopped by Ctrl-C.",
     epilog=examples("cmpdesign build tac3d -o mine", "cmpdesign verify --help"),
 )
 for module, function in (
@@ -33,6 +36,8 @@ for module, function in (
     (verify, verify.verify),
     (track, track.track),
     (reconstruct, reconstruct.reconstruct),
+    (dataset, dataset.dataset),
+    (extract, extract.extract),
     (kerf, kerf.kerf),
     (schema, schema.schema),
 ):

@@ -10,7 +10,6 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from cmpdesign.cli.missing_library import missing_library_text
 from cmpdesign.cli.mode import Mode, current_mode, use_mode
 from cmpdesign.cli.options.output import NAMES, output_parameters
 from cmpdesign.cli.terminal import (
@@ -23,6 +22,7 @@ from cmpdesign.cli.terminal import (
 )
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.texts import visible
+from cmpdesign.libraries import missing_library_text
 
 INTERRUPTED = "interrupted; every file that was written is complete"
 _OUTPUT_PARAMETERS = output_parameters()
@@ -68,11 +68,15 @@ class Command(TyperCommand):
         return super().invoke(ctx)
 
 
-class OneLineErrors(TyperGroup):
-    """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130."""
+class Group(TyperGroup):
+    """A group of commands, whose help text ends with examples."""
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         _write_examples(self.epilog, formatter)
+
+
+class OneLineErrors(Group):
+    """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130."""
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         use_mode(Mode(as_json=_asks_for_json(args)))  # for errors in the words, before options are known
@@ -112,7 +116,10 @@ def _finish_usage_error(error: Exception) -> None:
     """Of an error in the words, which quotes them: make its message printable, or print it as JSON and exit."""
     if not hasattr(error, "format_message"):
         return
-    text = shortened(visible(error.format_message(), keep="\n"))
+    message = error.format_message().replace(
+        ": Value error, ", ": ", 1
+    )  # the words of pydantic, which typer uses
+    text = shortened(visible(message, keep="\n"))
     if current_mode().as_json:
         print_error(text)
         raise typer.Exit(EXIT_BAD_INPUT) from None

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from cmpdesign.cli.mode import current_mode
 from cmpdesign.cli.terminal import console
 from cmpdesign.inputs.texts import visible
 
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+# Rates are means over this time; the trials of an experiment take up to a minute.
+SPEED_PERIOD_S = 300.0
 Advance = Callable[[str], None]
 
 
@@ -25,9 +31,61 @@ def progress_bar(doing: str, total: int | None, *, done: int = 0, unit: str = ""
     Yields:
         The function to call after every step, with a note that stands behind the bar.
     """
+    with _progress() as progress:
+        if progress is None:
+            yield lambda note: None
+            return
+        task = progress.add_task(visible(doing), total=total, completed=done, note="", rate="")
+
+        def advance(note: str) -> None:
+            progress.advance(task)
+            progress.update(task, note=visible(note), rate=_rate(progress, unit))
+
+        yield advance
+
+
+class Steps:
+    """Steps one after another, each with a bar of its own as soon as the number of its parts is known."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+
+    def begin(self, doing: str) -> None:
+        """A step begins."""
+        if self._progress is not None:
+            for task in self._progress.task_ids:
+                self._progress.remove_task(task)
+            self._progress.add_task(visible(doing), total=None, note="", rate="")
+
+    def tell(self, done: int, total: int, unit: str) -> None:
+        """Of the step's parts, so many are done; see ``cmpdesign.watch``."""
+        if self._progress is not None and self._progress.task_ids:
+            task = self._progress.task_ids[-1]
+            self._progress.update(task, completed=done, total=total)
+            self._progress.update(task, rate=_rate(self._progress, unit))
+
+
+@contextmanager
+def working(doing: str) -> Iterator[Steps]:
+    """Progress of work in steps; they vanish at the end. The first step is ``doing``."""
+    with _progress() as progress:
+        steps = Steps(progress)
+        steps.begin(doing)
+        yield steps
+
+
+def _rate(progress: Progress, unit: str) -> str:
+    task = progress.tasks[-1]
+    speed = task.finished_speed or task.speed
+    return "" if speed is None else f"{speed:.3g} {unit}/s"
+
+
+@contextmanager
+def _progress() -> Iterator[Progress | None]:
+    """Bars on stderr; None where no progress is shown."""
     terminal = console(stderr=True)
     if not terminal.is_terminal or not current_mode().prints_text:
-        yield lambda note: None
+        yield None
         return
     from rich.progress import (
         BarColumn,
@@ -48,28 +106,7 @@ def progress_bar(doing: str, total: int | None, *, done: int = 0, unit: str = ""
         TimeRemainingColumn(),
         TextColumn("{task.fields[note]}", markup=False),
     )
-    with Progress(*columns, console=terminal, transient=True) as progress:
-        task = progress.add_task(visible(doing), total=total, completed=done, note="", rate="")
-
-        def advance(note: str) -> None:
-            progress.advance(task)
-            speed = progress.tasks[0].finished_speed or progress.tasks[0].speed
-            rate = "" if speed is None else f"{speed:.3g} {unit}/s"
-            progress.update(task, note=visible(note), rate=rate)
-
-        yield advance
-
-
-@contextmanager
-def working(doing: str) -> Iterator[Callable[[str], None]]:
-    """A text with the time that has passed, for work without countable steps; yields the function that changes it."""
-    terminal = console(stderr=True)
-    if not terminal.is_terminal or not current_mode().prints_text:
-        yield lambda text: None
-        return
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with Progress(*columns, console=terminal, transient=True) as progress:
-        task = progress.add_task(visible(doing), total=None)
-        yield lambda text: progress.update(task, description=visible(text))
+    with Progress(
+        *columns, console=terminal, transient=True, speed_estimate_period=SPEED_PERIOD_S
+    ) as progress:
+        yield progress

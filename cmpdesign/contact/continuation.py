@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cmpdesign.contact.elastic_layer.patch_response import patch_response
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.errors import require
+from cmpdesign.libraries import extra
 
 Array = NDArray[np.float64]
 # In units of the distance of neighbouring markers, between loads. Coarser loads understate what an edge leaves open.
@@ -84,7 +85,8 @@ class SurfaceContinuation:
 
 def _load_grid(xy_mm: Array, spacing_mm: float, margin_mm: float) -> Array:
     """(K, 2) points of a square grid that lie within the margin of a marker."""
-    from scipy.spatial import cKDTree
+    with extra("evaluate"):
+        from scipy.spatial import cKDTree
 
     low, high = xy_mm.min(axis=0) - margin_mm, xy_mm.max(axis=0) + margin_mm
     counts = np.ceil((high - low) / spacing_mm).astype(int)
@@ -106,8 +108,9 @@ def _block_diagonal(blocks: Array) -> Array:
 
 def _likeliest_variance(seen: Array, noise: Array, values: Array) -> float:
     """The variance of the tractions under which the values are likeliest."""
-    from scipy.linalg import eigh
-    from scipy.optimize import minimize_scalar
+    with extra("evaluate"):
+        from scipy.linalg import eigh
+        from scipy.optimize import minimize_scalar
 
     # one eigendecomposition makes all candidates diagonal
     scale, vectors = eigh(seen, noise)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.contact.grid import ContactGrid
+from cmpdesign.libraries import extra
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -89,7 +90,8 @@ class Relief:
 
     def _displacement(self, part: int, xy_mm: Array) -> Array:
         """(N,) mm: one of the splines at points (N, 2) mm."""
-        from scipy.ndimage import map_coordinates
+        with extra("evaluate"):
+            from scipy.ndimage import map_coordinates
 
         column = (xy_mm[:, 0] - self.grid.x_mm[0]) / self.grid.step_mm
         row = (xy_mm[:, 1] - self.grid.y_mm[0]) / self.grid.step_mm
@@ -102,7 +104,8 @@ class Relief:
 
 def make_relief(contact: Contact, displacement_mm: Array, by_press_mm: Array) -> Relief:
     """The splines of a contact's displacement (ny, nx, 3) and of the press's part (ny, nx, 2) of it."""
-    from scipy.ndimage import spline_filter
+    with extra("evaluate"):
+        from scipy.ndimage import spline_filter
 
     step = float(contact.x_mm[1] - contact.x_mm[0])
     margin = max(6, int(np.ceil(contact.thickness_mm / step)))

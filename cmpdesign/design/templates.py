@@ -11,7 +11,7 @@ from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.files import path_exists, read_text
 from cmpdesign.inputs.names import nearest_name
 
-KINDS = ("scenes", "machines", "materials", "silicones", "sensors")
+KINDS = ("scenes", "plans", "machines", "materials", "silicones", "sensors")
 
 
 def templates_folder() -> Path:
@@ -82,6 +82,20 @@ def template_words(path: Path) -> TemplateWords:
 def scene_templates() -> dict[str, Path]:
     """Every scene template by name, in alphabetical order."""
     return _in_folder("scenes")
+
+
+def plan_templates() -> dict[str, Path]:
+    """Every plan template by name, in alphabetical order."""
+    return _in_folder("plans")
+
+
+def find_plan(name_or_path: str | Path) -> Path:
+    """The TOML file of a plan template's name or of a path.
+
+    Raises:
+        DesignError: neither a template nor a file.
+    """
+    return _find_template(name_or_path, plan_templates())
 
 
 def find_design(name_or_path: str | Path) -> Path:

@@ -14,6 +14,7 @@ from cmpdesign.evaluate.designs import DesignEntry
 from cmpdesign.evaluate.journal import Journal
 from cmpdesign.evaluate.report.page import Section, report_html
 from cmpdesign.evaluate.runner import RunOptions, Trial, TrialsBar, Work, no_bar, run_trials
+from cmpdesign.libraries import require_libraries
 
 Figures = Callable[[Sequence[Trial], Sequence[Mapping[str, Any]]], dict[str, Any]]
 
@@ -88,11 +89,13 @@ def run_experiment(
         The report's document, and the written files.
 
     Raises:
+        MissingLibraryError: a library of the extra [evaluate] is not installed.
         CmpDesignError: the folder holds a run under other conditions, or a value is out of range.
         OutputError: a file cannot be written; finished trials are kept.
     """
     from cmpdesign.files.atomic import write_folder
 
+    require_libraries("evaluate", "matplotlib", "scipy", "threadpoolctl")
     conditions = {"experiment": experiment.name, "version": __version__, **options.values}
     trials = experiment.trials(options)
     with Journal(folder, conditions) as journal:

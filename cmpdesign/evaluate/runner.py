@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import zlib
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
@@ -14,6 +13,8 @@ import numpy as np
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.journal import Journal
+from cmpdesign.libraries import extra
+from cmpdesign.workers import worker_pool
 
 
 @dataclass(frozen=True)
@@ -125,25 +126,13 @@ def _iterate_results(
         for trial in trials:
             yield trial.key, _run_trial(work, trial.values)
         return
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from multiprocessing import active_children, get_context
+    from concurrent.futures import as_completed
 
-    others = set(active_children())
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_ignore_interrupts) as pool:
+    # Left early, trials in work would take up to a minute, and their results are not kept: the pool ends them.
+    with worker_pool(workers) as pool:
         keys = {pool.submit(_run_trial, work, dict(trial.values)): trial.key for trial in trials}
-        try:
-            for done in as_completed(keys):
-                yield keys[done], done.result()
-        except BaseException:  # trials in work would take up to a minute, and their results are not kept
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in set(active_children()) - others:
-                process.kill()
-            raise
-
-
-def _ignore_interrupts() -> None:
-    """Ignore Ctrl-C in a worker: it reaches all processes of a terminal, and the parent ends the run."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        for done in as_completed(keys):
+            yield keys[done], done.result()
 
 
 def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
@@ -153,12 +142,8 @@ def _run_trial(work: Work, values: Mapping[str, Any]) -> Any:
     """
     import cv2
 
-    try:
+    with extra("evaluate"):
         from threadpoolctl import threadpool_limits
-    except ModuleNotFoundError as error:
-        raise CmpDesignError(
-            "evaluation needs threadpoolctl, which is not installed; install cmpdesign[evaluate]"
-        ) from error
     cv2.setNumThreads(1)
     with threadpool_limits(1):
         return json.loads(json.dumps(work(values), allow_nan=False))

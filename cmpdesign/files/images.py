@@ -63,12 +63,21 @@ def decode_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[An
     Raises:
         ImageFileError: the file cannot be read, is no image, or has more than ``most_pixels`` pixels.
     """
-    import cv2
-
     try:
         data = read_file(path)
     except InputError as error:
         raise ImageFileError(str(error)) from None
+    return decode_bytes(data, path, most_pixels)
+
+
+def decode_bytes(data: bytes, path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:
+    """The pixels in the bytes of an image file, as ``decode_image``; ``path`` is for messages.
+
+    Raises:
+        ImageFileError: see ``decode_image``.
+    """
+    import cv2
+
     if not data:
         raise ImageFileError(f"{path}: is empty; expected an image")
     size = size_in_header(data)
@@ -135,6 +144,14 @@ def to_png(pixels: Image) -> bytes:
     import cv2
 
     return bytes(cv2.imencode(".png", pixels)[1])
+
+
+def to_jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
+    """Encode a (H, W, 3) BGR image as JPEG of a quality from 1 to 100, with the full resolution of color (4:4:4)."""
+    import cv2
+
+    full_color = [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
+    return bytes(cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality, *full_color])[1])
 
 
 def require_image_kind(path: Path, bits: int) -> None:

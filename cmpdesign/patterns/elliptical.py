@@ -9,6 +9,9 @@ from cmpdesign.patterns import PatternShape, register_pattern
 from cmpdesign.patterns.graphs import TRIANGULAR_GRAPHS
 from cmpdesign.patterns.numbering import Ints
 
+# Of the speed along an ellipse: samples of half a turn, and terms of its series.
+ARC_SAMPLES, ARC_TERMS = 512, 80
+
 
 @register_pattern("elliptical", TRIANGULAR_GRAPHS, options=("aspect", "spacing"))
 def elliptical_positions(layer: Ints, index: Ints, shape: PatternShape) -> NDArray[np.float64]:
@@ -33,21 +36,25 @@ def elliptical_positions(layer: Ints, index: Ints, shape: PatternShape) -> NDArr
 def _angle_from_arc(turn: NDArray[np.float64], aspect: float) -> NDArray[np.float64]:
     """The parameter angle t in rad at which the arc from 0 to t is the share ``turn`` of the perimeter.
 
-    For (cos t, aspect sin t), the arc from the top down to t is E(pi/2 - t | 1 - aspect^2), Legendre's
-    incomplete integral of the second kind (DLMF 19.30.2). Newton's method applies because the derivative of the
-    arc never vanishes.
+    The speed of (cos t, aspect sin t) is even and has the period pi. The terms of its cosine series are integrated one
+    by one; they fall at least as 0.6^k for aspects from 1/4 to 4, so that what is left out is below 1e-17 of the arc.
+    Newton's method applies because the derivative of the arc never vanishes.
     """
-    from scipy.special import ellipe, ellipeinc
-
-    m = 1 - aspect**2
-    quarter_arc = ellipe(m)
-    target_arc = 4 * quarter_arc * turn
+    samples = np.pi * np.arange(ARC_SAMPLES) / ARC_SAMPLES
+    cosines = np.fft.rfft(_speed(samples, aspect)).real / ARC_SAMPLES
+    mean_speed, order = cosines[0], np.arange(1, ARC_TERMS + 1)
+    sines = cosines[order] / order
     angle = 2 * np.pi * turn
     for _ in range(50):
-        arc = quarter_arc - ellipeinc(np.pi / 2 - angle, m)
-        correction = (arc - target_arc) / np.hypot(np.sin(angle), aspect * np.cos(angle))
+        arc = mean_speed * angle + np.sin(2 * angle[..., None] * order) @ sines
+        correction = (arc - 2 * np.pi * mean_speed * turn) / _speed(angle, aspect)
         # At most half a radian: the arc's derivative is nearly zero at the tips of a flat ellipse.
         angle = angle - np.clip(correction, -0.5, 0.5)
         if np.abs(correction).max(initial=0.0) < 1e-14:
             break
     return np.asarray(angle, dtype=np.float64)
+
+
+def _speed(angle: NDArray[np.float64], aspect: float) -> NDArray[np.float64]:
+    """The derivative of the arc by the parameter angle."""
+    return np.hypot(np.sin(angle), aspect * np.cos(angle))

@@ -45,6 +45,9 @@ class Truth:
     marker_xyz_mm: NDArray[np.float64]
     virtual_xyz_mm: NDArray[np.float64]
 
+    def __repr__(self) -> str:
+        return f"<Truth: {np.count_nonzero(self.visible)} of {self.visible.size} markers visible>"
+
 
 def save_truth(truth: Truth, path: str | Path) -> Path:
     """Write the truth of one image as .npz, without ``H`` where it is None.

@@ -15,6 +15,7 @@ from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind, is_st
 
 DEFAULT_FPS = 30.0
 MAX_FAILED_READS = 10  # consecutive failures after which a stream counts as ended
+PHOTO_SUFFIXES = frozenset({".heic", ".heif", ".avif", ".dng"})  # what phones write beside JPEG
 STREAM_TIMEOUT_MS = 4000  # for opening and reading; a stop waits no longer
 
 
@@ -33,6 +34,12 @@ class SourceFrame:
     image: Any
     problem: str = ""
     path: Path | None = None
+
+    def __repr__(self) -> str:
+        seen = self.problem or (
+            "x".join(map(str, self.image.shape)) if hasattr(self.image, "shape") else "views"
+        )
+        return f"<SourceFrame at {self.time_s:.6g} s: {seen}>"
 
 
 class FrameSource(Protocol):
@@ -178,6 +185,11 @@ class VideoSource:
             raise SourceError(
                 f"{path}: no such file or folder; expected pictures, a folder of them, a pattern such as 'run/*.png', "
                 "a video or a camera's number"
+            )
+        if path.suffix.lower() in PHOTO_SUFFIXES:
+            raise SourceError(
+                f"{path}: photos of this format are not read; expected JPEG, PNG, TIFF, BMP or WebP: convert the file, "
+                "or set the phone's camera to JPEG (on an iPhone: Most Compatible)"
             )
         self._capture = _open_capture(str(path))
         if not self._capture.isOpened():

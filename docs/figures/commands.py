@@ -89,8 +89,8 @@ def _section(words: tuple[str, ...], command: Any) -> str:
 
 
 def _argument_row(parameter: Any) -> tuple[str, str]:
-    several = "..." if parameter.nargs == -1 and not parameter.metavar.endswith(("...", "...]")) else ""
-    return f"`{parameter.metavar}{several}`", _escaped(parameter.help)
+    name = parameter.metavar if parameter.required else f"[{parameter.metavar}]"
+    return f"`{name}{'...' if parameter.nargs == -1 else ''}`", _escaped(parameter.help)
 
 
 def _option_row(parameter: Any) -> tuple[str, str]:

@@ -6,17 +6,32 @@ from pathlib import Path
 
 from benchmarks.camera.page import page_pictures
 
-from . import commands, fields, gallery, measured
-from .pictures import contact, drawings, hero, scene_templates, sides, stages, surface
+from . import api, commands, fields, gallery, measured, reasons
+from .pictures import contact, drawings, failures, hero, lengths, scene_templates, sides, stages, surface
+from .pictures.tutorials import photos
 
 DOCS = Path(__file__).resolve().parent.parent
 IMAGES = DOCS / "images"
+PARTS = (
+    hero,
+    drawings,
+    lengths,
+    sides,
+    stages,
+    failures,
+    gallery,
+    contact,
+    measured,
+    scene_templates,
+    surface,
+    photos,
+)
 
 
 def pictures() -> dict[str, bytes]:
     """Name in docs/images -> PNG, SVG or JPEG."""
     found: dict[str, bytes] = {}
-    for part in (hero, drawings, sides, stages, gallery, contact, measured, scene_templates, surface):
+    for part in PARTS:
         found |= part.figures()
     return found | page_pictures()
 
@@ -27,6 +42,8 @@ def pages() -> dict[Path, str]:
     return {
         DOCS / "reference" / "gallery.md": gallery.page(),
         DOCS / "reference" / "command-line.md": commands.page(),
+        DOCS / "reference" / "api.md": api.page(),
+        DOCS / "reference" / "reasons.md": reasons.page(),
         design_files: fields.filled(design_files.read_text(encoding="utf-8")),
         **measured.pages(),
     }

@@ -53,12 +53,13 @@ def table(model: type[BaseModel]) -> str:
 
 
 def _rows(model: type[BaseModel], properties: dict[str, Any]) -> str:
-    rows = ["| field | takes | default | meaning |", "|---|---|---|---|"]
+    rows = ["| field | unit | takes | default | meaning |", "|---|---|---|---|---|"]
     for name, field in model.model_fields.items():
         default = (
             "required" if field.is_required() else _default(field.get_default(call_default_factory=True))
         )
-        rows.append(f"| `{name}` | {_takes(name, properties[name])} | {default} | {field.description} |")
+        takes = _takes(name, properties[name])
+        rows.append(f"| `{name}` | {_unit(name)} | {takes} | {default} | {field.description} |")
     return "\n".join(rows) + "\n"
 
 
@@ -91,6 +92,12 @@ def _default(value: Any) -> str:
     return f"`{shown}`"
 
 
+def _unit(name: str) -> str:
+    """The unit that stands at the end of a field's name."""
+    units = {"_mm_s": "mm/s", "_mm": "mm", "_deg": "deg", "_percent": "%"}
+    return next((unit for end, unit in units.items() if name.endswith(end)), "")
+
+
 def _takes(name: str, schema: dict[str, Any]) -> str:
     if "$ref" in schema:
         return "a table"
@@ -98,17 +105,22 @@ def _takes(name: str, schema: dict[str, Any]) -> str:
         return ", ".join(f'`"{pattern}"`' for pattern in registered_patterns())
     options = [option for option in schema.get("anyOf", [schema]) if option.get("type") != "null"]
     nested = [inner for option in options for inner in option.get("anyOf", [option])]
-    words = [_kind(name, inner) for inner in nested]
-    return " or ".join(dict.fromkeys(words))
+    if name.endswith(("_mm", "_deg")):  # a number, or a text with a unit
+        number = next(inner for inner in nested if inner.get("type") == "number")
+        return ("a length" if name.endswith("_mm") else "an angle") + _range(number)
+    return " or ".join(dict.fromkeys(_kind(inner) for inner in nested))
 
 
-def _kind(name: str, schema: dict[str, Any]) -> str:
+def _kind(schema: dict[str, Any]) -> str:
     if "enum" in schema:
         return ", ".join(f"`{json.dumps(choice)}`" for choice in schema["enum"])
-    if name.endswith(("_mm", "_deg")):
-        return "a length" if name.endswith("_mm") else "an angle"
     kind = {"boolean": "true or false", "integer": "an integer", "number": "a number", "string": "a text"}
-    low, high = schema.get("minimum"), schema.get("maximum")
-    return kind[schema["type"]] + (
-        f" from {low:g} to {high:g}" if low is not None and high is not None else ""
-    )
+    return kind[schema["type"]] + _range(schema)
+
+
+def _range(schema: dict[str, Any]) -> str:
+    """What a number may be, as words after its kind."""
+    low, above, high = (schema.get(key) for key in ("minimum", "exclusiveMinimum", "maximum"))
+    lower = "" if low is None else f" from {low:g}"
+    lower = lower if above is None else f" above {above:g}"
+    return lower + ("" if high is None else f" to {high:g}")

@@ -11,6 +11,28 @@ from benchmarks.suites.comparison.pooled import PooledResult
 from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture, pooled_markdown
 from benchmarks.support.machine import conditions_text
 from benchmarks.support.published import read_measured, updated_pages
+from extractor.presets import PRESETS
+
+# Figures of runs that are too long to be published with every change: what, figure, benchmark.
+STATED = (
+    ("random damage, 1,400 pictures", "3 wrong of 448,182 markers, none with another marker's id", "damage"),
+    (
+        "two views, press of 1 mm",
+        "0.6 um across, 1.5 um in depth ([table](docs/how-to/reconstruction.md#how-precise))",
+        "reconstruction",
+    ),
+    (
+        "kerf from a photo of the coupon",
+        "5.1 um RMS ([table](docs/how-to/laser.md#measure-first))",
+        "kerf",
+    ),
+    ("molds of 1,452 cells as STEP", "11 s ([table](docs/how-to/molds.md#figures))", "molds"),
+    (
+        "start of a process to its first markers",
+        "twice the time to import numpy and OpenCV, 65 MB",
+        "startup",
+    ),
+)
 
 
 def _compared() -> list[MethodResult]:
@@ -26,7 +48,11 @@ def pages() -> dict[Path, str]:
     """README and the pages of docs/ with a measured table."""
     precise = [accuracy.AccuracyResult(**row) for row in read_measured("accuracy")["results"]]
     conditions = conditions_text(read_measured("comparison")["conditions"])
-    blocks = {"comparison": comparison_markdown(_compared()), "conditions": conditions}
+    blocks = {
+        "comparison": comparison_markdown(_compared()),
+        "conditions": conditions,
+        "figures": key_figures(_compared()),
+    }
     pooled = [PooledResult(**row) for row in read_measured("comparison").get("pooled", ())]
     if pooled:
         blocks["comparison-pooled"] = pooled_markdown(pooled)
@@ -36,3 +62,17 @@ def pages() -> dict[Path, str]:
         | extraction.markdown(read_measured("extraction"))
         | camera.documentation_blocks(read_measured("camera"))
     )
+
+
+def key_figures(results: list[MethodResult]) -> str:
+    """The table of README: what is measured, and the command that prints it."""
+    rows = ["| measured | figure | printed by |", "|---|---|---|"]
+    for preset in PRESETS:
+        flat = next(r for r in results if (r.method, r.scene) == (f"cmpdesign, {preset}", "flat"))
+        of_bound = flat.inner_px / flat.bound_px
+        rows.append(
+            f"| 397 markers at 20 px, preset `{preset}` | {flat.inner_px:.4f} px RMS per axis, {of_bound:.2f} of the "
+            f"[exact bound](docs/explanation/accuracy.md); {flat.ms:.1f} ms | `python -m benchmarks.comparison` |"
+        )
+    rows += [f"| {what} | {figure} | `python -m benchmarks.{name}` |" for what, figure, name in STATED]
+    return "\n".join(rows)

@@ -8,7 +8,7 @@ nominal layout, is drawn towards the nominal places; so pictures are read again 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -63,6 +63,7 @@ def learn_layout(
     images: Sequence[NDArray[Any]],
     *,
     names: Sequence[str] | None = None,
+    watch: Callable[[int, int], None] = lambda done, total: None,
     **options: Any,
 ) -> LearntLayout:
     """The places of a pad's markers from pictures of the pad at rest, from any direction, each by one homography.
@@ -75,6 +76,8 @@ def learn_layout(
         layout: the nominal layout of a triangular pattern, as for ``Extractor``.
         images: 10 pictures or more, as for ``Extractor.extract``.
         names: of the pictures, for messages; by default "picture 1" and so on.
+        watch: called after every reading of a picture with the numbers of readings that are done and of all; every
+            picture is read ``READINGS`` times.
         options: of ``Extractor``, such as ``response``. The preset is "accurate" unless another is given: what
             a preset leaves in all pictures alike no number of pictures takes off.
 
@@ -91,9 +94,12 @@ def learn_layout(
         raise RestError(f"{len(images)} pictures of the pad at rest; give {MIN_PICTURES} or more")
     names = names or [f"picture {number}" for number in range(1, len(images) + 1)]
     current = layout
-    for _ in range(READINGS):
+    for reading in range(READINGS):
         extractor = Extractor(current, **{"preset": "accurate", **options})
-        read = [_read(extractor, image, name) for image, name in zip(images, names, strict=True)]
+        read: list[Markers] = []
+        for image, name in zip(images, names, strict=True):
+            read.append(_read(extractor, image, name))
+            watch(reading * len(images) + len(read), READINGS * len(images))
         side = _common_side(read, names)
         found = _adjusted(read, names, layout)
         current = _as_made(layout, found, side)

@@ -78,6 +78,10 @@ class Tracked:
     displacement_mm: NDArray[np.float64]
     elapsed_ms: float
 
+    def __repr__(self) -> str:
+        reason = f"; {self.reason}" if self.reason else ""
+        return f"<Tracked {self.index}: {self.status.name.lower()}, {self.markers}{reason}>"
+
 
 @dataclass(frozen=True, eq=False)
 class _TrackState:

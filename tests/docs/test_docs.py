@@ -41,6 +41,7 @@ from cmpdesign.inputs import files as inputs
 from cmpdesign.inputs import names as lines
 from cmpdesign.patterns import registered_patterns
 from docs.figures import everything, fields
+from tests.docs.stand_ins import make_stand_in
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -49,6 +50,7 @@ FENCE = re.compile(r"^```(\w+)(?: ([\w.]+))?\n(.*?)^```$", re.MULTILINE | re.DOT
 DECIMAL = re.compile(r"-?\d+\.\d+")
 FREE_MS = re.compile(r"\d+(\.\d+)? ms")
 COLUMNS = "120"
+SLOW_PAGES = {"cast-pad", "compare-designs"}
 DEMO_FIGURES = ("visible", "measured", "wrong ids", "RMS error per axis")
 
 
@@ -128,7 +130,7 @@ def run_command(words: list[str]) -> tuple[str, int]:
         return Path(words[1]).read_text(encoding="utf-8"), 0
     if words[0] == "make":
         makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-        recipe = re.search(rf"^{words[1]}: .*\n\t(.*)$", makefile, re.MULTILINE)
+        recipe = re.search(rf"^{words[1]}:.*(?:\n\t(.*))?$", makefile, re.MULTILINE)
         assert recipe, f"the Makefile has no target {words[1]}"
         if words[1] == "demo":
             assert recipe[1].endswith("-m cmpdesign.demo")
@@ -142,6 +144,7 @@ def run_command(words: list[str]) -> tuple[str, int]:
             code = importlib.import_module(words[2]).main(words[3:])
         return printed.getvalue(), code
     assert words[0] == "cmpdesign", words
+    make_stand_in(words)
     result = CliRunner().invoke(app, words[1:])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result.output, result.exit_code
@@ -155,7 +158,11 @@ def run_python(block: Block, names: dict[str, Any], page: str) -> None:
     )
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=pytest.mark.slow if page.stem in SLOW_PAGES else ()) for page in PAGES],
+    ids=lambda page: page.stem,
+)
 def test_every_command_and_snippet_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", COLUMNS)

@@ -35,6 +35,7 @@ READS = {
     "cmpdesign/files/locks.py": {"os.open"},  # to lock: nothing is read
     "cmpdesign/files/atomic.py": {"os.open", "open 'rb+'"},  # to flush to disk what it wrote
     "cmpdesign/tracking/sources.py": {"cv2.VideoCapture"},
+    "cmpdesign/data/videos/pieces.py": {"open 'r'"},  # of a video, by PyAV
     "cmpdesign/files/video_writer.py": {"cv2.VideoCapture"},  # of the video that it wrote
     "cmpdesign/tracking/sinks/csv_recovery.py": {"open 'r+b'"},  # to cut the text behind its last whole frame
     "cmpdesign/evaluate/journal.py": {
@@ -43,6 +44,7 @@ READS = {
     },  # the installed code's digest; its own last line
     "cmpdesign/products/mold/processes.py": {"os.fdopen"},  # to write to a process
     "cmpdesign/evaluate/runner.py": {"json.loads"},  # of a text that it just made
+    "cmpdesign/libraries.py": {"read_text", "json.loads"},  # what pip noted beside the installed package
 }
 READING = {
     "os.open", "os.fdopen", "tomllib.loads", "tomllib.load", "json.loads", "json.load", "cv2.imdecode", "cv2.imread",

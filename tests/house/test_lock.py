@@ -16,6 +16,7 @@ DECLARED = [
     Requirement(text)
     for texts in (PROJECT["dependencies"], *PROJECT["optional-dependencies"].values())
     for text in texts
+    if not text.startswith("cmpdesign[")  # an extra that takes others
 ]
 LOCKED = {
     canonicalize_name(name): locked

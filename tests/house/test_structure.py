@@ -35,8 +35,8 @@ ROOMS = {
         " pipeline made track space draw"
     ),
     "cmpdesign": (
-        "errors units inputs patterns design layout files reading contact scene products tracking evaluate api"
-        " proposal cli demo __main__ writers"
+        "errors libraries units workers watch inputs patterns design layout files reading contact scene products"
+        " tracking evaluate data api proposal cli demo __main__ writers"
     ),
 }
 NOT_DESCRIBED = {"extractor", "cmpdesign", "cmpdesign.writers"}  # the tops, and what is kept for old programs

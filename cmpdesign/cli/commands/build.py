@@ -17,9 +17,9 @@ from cmpdesign.cli.options.designs import (
     parse_overrides,
 )
 from cmpdesign.cli.options.images import PresetOption
-from cmpdesign.cli.progress import working
+from cmpdesign.cli.progress import Steps, working
 from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
-from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products
+from cmpdesign.products.registry import PREVIEW, PRODUCTS, REPORT, USUAL_NAMES, chosen_products
 
 if TYPE_CHECKING:
     from cmpdesign.layout.report import DesignReport
@@ -56,6 +56,7 @@ def build(
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
     from cmpdesign.products.building import build_files
+    from cmpdesign.watch import watched
 
     names, camera_px = chosen_products(only), parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
@@ -63,8 +64,9 @@ def build(
     print_step(
         f"{parameters.name}: layout of {len(layout.marker_xy_mm)} markers, digest {layout.digest[:12]}"
     )
-    with working("building") as tell:
-        built = build_files(parameters, layout, output, names, camera_px, preset=preset, watch=_steps(tell))
+    with working("building") as steps, watched(steps.tell):
+        watch = _watch(steps, sum(name not in (PREVIEW, REPORT) for name in names))
+        built = build_files(parameters, layout, output, names, camera_px, preset=preset, watch=watch)
     for path in built.written:
         say(f"wrote {printable_path(path)}")
     for path in built.removed:
@@ -91,11 +93,15 @@ def build(
     )
 
 
-def _steps(tell: Callable[[str], None]) -> Callable[[str], None]:
-    """What is called with the name of every product before it is made."""
+def _watch(steps: Steps, number: int) -> Callable[[str], None]:
+    """What is called with the name of each of a number of products, and of other steps, before it is made."""
+    begun = 0
 
     def watch(name: str) -> None:
-        tell(f"building: {name}")
+        nonlocal begun
+        begun += 1
+        product = f"building {name} ({begun} of {number})" if number > 1 else f"building {name}"
+        steps.begin(product if begun <= number else name)
         print_step(f"{name} begins")
 
     return watch

@@ -43,11 +43,12 @@ def check(
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
     from cmpdesign.products.building import check_products
+    from cmpdesign.watch import watched
 
     camera_px = parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
-    with working("drawing and reading pads" if read else "checking"):
+    with working("drawing and reading pads" if read else "checking") as steps, watched(steps.tell):
         checked = check_products(parameters, layout, camera_px, read=read, preset=preset)
     for name, reading in checked.readings.items():
         say(f"{name} as made: {reading.line()}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.command import Command, examples
+from cmpdesign.cli.command import Command, Group, examples
 from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import progress_bar
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
@@ -22,10 +22,15 @@ if TYPE_CHECKING:
     from cmpdesign.evaluate.designs import DesignEntry
 
 app = typer.Typer(
+    cls=Group,
+    epilog=examples(
+        "cmpdesign evaluate precision -o quick --trials 1 --preset fast",
+        "cmpdesign evaluate designs tac3d digit -o compared",
+    ),
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Repeat the article's experiments. On a simulated sensor; also compares designs. Writes report.html and "
-    "report.json; an interrupted run goes on where it stopped.",
+    help="Repeat the article's experiments on a simulated sensor, and compare designs.\n\nWrites report.html and "
+    "report.json. An interrupted run goes on where it stopped.",
 )
 
 Output = Annotated[
@@ -147,7 +152,7 @@ def angles(output: Output, workers: Workers = None) -> None:
     ),
 )
 def designs(
-    design: Annotated[list[str], typer.Argument(metavar="DESIGN...", help="Templates or TOML files.")],
+    design: Annotated[list[str], typer.Argument(metavar="DESIGN", help="Templates or TOML files.")],
     output: Output,
     trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = USUAL_TRIALS[
         "designs"

@@ -26,6 +26,7 @@ EXAMPLES = (
     "cmpdesign render layout.json -o pressed.png --scene pressed-ball --truth pressed.npz",
 )
 LARGEST_SIDE_PX = 9999
+SCENES = "flat-print, press-and-twist, pressed-ball, tac3d-binocular"
 # Options with a key in a scene file.
 SCENE_FILE_KEYS = {
     "pitch": "[camera] pitch_px",
@@ -68,7 +69,7 @@ def render(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Scene TOML, or the name of a scene template: cmpdesign templates --kind scenes.",
+            help=f"Scene TOML, or the name of a scene template: {SCENES}.",
             autocompletion=complete_scene,
         ),
     ] = None,

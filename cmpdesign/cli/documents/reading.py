@@ -27,11 +27,14 @@ class SheetPart(Part):
 
     name: str
     digest: str
+    length_x_px: float = Field(description="Of the bar along x.")
+    length_y_px: float
     scale_x: float | None = Field(description="Printed over designed; null without a known resolution.")
     scale_y: float | None
     ratio: float = Field(description="scale_x / scale_y.")
-    skew_deg: float
-    perspective_mm: float
+    skew_deg: float = Field(description="Angle between the bars, less 90 degrees.")
+    rotation_deg: float = Field(description="Of the bar along x in the picture, clockwise.")
+    perspective_mm: float = Field(description="Distance of a bar's end from the best affine map.")
     dpi: tuple[float, ...] | None
     note: str | None
 

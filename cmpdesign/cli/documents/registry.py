@@ -8,7 +8,7 @@ from typing import Union
 
 from pydantic import TypeAdapter
 
-from cmpdesign.cli.documents import designs, reading, runs
+from cmpdesign.cli.documents import data, designs, reading, runs
 from cmpdesign.cli.documents.document import Document, Message
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.names import nearest_name
@@ -25,6 +25,8 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "verify": (reading.VerifyDocument,),
     "track": (runs.TrackDocument, runs.RecoverDocument),
     "reconstruct": (runs.ReconstructDocument, runs.RecoverDocument),
+    "dataset": (data.DatasetDocument,),
+    "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument,),
     "calibrate pattern": (reading.CalibratePatternDocument,),
     "export lerobot": (runs.ExportDocument,),

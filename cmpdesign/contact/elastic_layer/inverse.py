@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.contact.elastic_layer.green import GreenKernels
 from cmpdesign.contact.elastic_layer.kernels import layer_compliances
+from cmpdesign.libraries import extra
 
 Single = NDArray[np.float32]
 
@@ -34,7 +35,8 @@ class InversePreconditioner:
     @classmethod
     def of(cls, green: GreenKernels, box: tuple[int, int]) -> Self:
         """The preconditioner for a box of (rows, columns) cells."""
-        from scipy.fft import next_fast_len
+        with extra("evaluate"):
+            from scipy.fft import next_fast_len
 
         rows, columns = (int(next_fast_len(n, real=True)) for n in box)
         sampling_rate = 2 * np.pi / green.step_mm
@@ -62,7 +64,8 @@ class InversePreconditioner:
 
     def __call__(self, values: Single) -> Single:
         """Tractions in MPa from displacements in mm, (3, rows, columns) or (1, rows, columns) float32."""
-        from scipy.fft import irfft2, rfft2
+        with extra("evaluate"):
+            from scipy.fft import irfft2, rfft2
 
         rows, columns = values.shape[1:]
         spectrum = rfft2(values, s=self.shape, workers=1)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cmpdesign._native import elastic_layer
 from cmpdesign.contact.elastic_layer.green import GreenKernels
 from cmpdesign.contact.elastic_layer.inverse import InversePreconditioner
+from cmpdesign.libraries import extra
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -42,7 +43,8 @@ class ComplianceOperator:
     """
 
     def __init__(self, green: GreenKernels, shape: tuple[int, int]) -> None:
-        from scipy.fft import next_fast_len, rfft2
+        with extra("evaluate"):
+            from scipy.fft import next_fast_len, rfft2
 
         self.shape = shape
         self.padded = tuple(int(next_fast_len(n + min(n, green.reach), real=True)) for n in shape)
@@ -91,14 +93,16 @@ class ComplianceOperator:
 
     def _forward_transform(self, values: Field) -> Spectrum:
         """The padded spectrum. The padding's rows are empty and are not transformed along x."""
-        from scipy.fft import fft, rfft
+        with extra("evaluate"):
+            from scipy.fft import fft, rfft
 
         along = rfft(values, n=self.padded[1], axis=2, workers=1)
         return np.asarray(fft(along, n=self.padded[0], axis=1, workers=1, overwrite_x=True))
 
     def _inverse_transform(self, spectrum: Spectrum) -> Field:
         """The values in the box."""
-        from scipy.fft import ifft, irfft
+        with extra("evaluate"):
+            from scipy.fft import ifft, irfft
 
         rows, columns = self.shape
         along = ifft(spectrum, axis=1, workers=1, overwrite_x=True)[:, :rows]
@@ -107,7 +111,8 @@ class ComplianceOperator:
 
 def interior_displacement_mm(green: GreenKernels, traction_mpa: Array) -> Array:
     """Displacement (3, rows, columns) in mm at the kernels' depth, of a traction (3, rows, columns) in MPa."""
-    from scipy.fft import irfft2, next_fast_len, rfft2
+    with extra("evaluate"):
+        from scipy.fft import irfft2, next_fast_len, rfft2
 
     shape = traction_mpa.shape[1:]
     padded = tuple(int(next_fast_len(n + min(n, green.reach), real=True)) for n in shape)

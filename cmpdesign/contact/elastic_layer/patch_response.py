@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from cmpdesign.contact.elastic_layer.green import KERNEL_REACH_THICKNESSES
 from cmpdesign.contact.elastic_layer.kernels import interior_compliances, layer_compliances
 from cmpdesign.contact.elastomer import Elastomer
+from cmpdesign.libraries import extra
 
 Array = NDArray[np.float64]
 WAVE_REACH = 7.0  # in units of 1 / s, the largest wave number; P is 2e-11 of its largest value there
@@ -44,7 +45,8 @@ class PatchResponse:
 
     def matrix(self, points_mm: Array, centres_mm: Array) -> Array:
         """(3 N, 3 K) mm/MPa: displacement x, y, z of points (N, 2) by the peak tractions x, y, z of loads at (K, 2)."""
-        from scipy.interpolate import CubicSpline
+        with extra("evaluate"):
+            from scipy.interpolate import CubicSpline
 
         offset = points_mm[:, None] - centres_mm[None]
         distance = np.hypot(offset[..., 0], offset[..., 1])
@@ -67,7 +69,8 @@ def patch_response(elastomer: Elastomer, width_mm: float, depth_mm: float, reach
 
     Beyond ``KERNEL_REACH_THICKNESSES`` the layer does not respond, and the tables end.
     """
-    from scipy.special import j0, j1, jv
+    with extra("evaluate"):
+        from scipy.special import j0, j1, jv
 
     reach_mm = min(reach_mm, KERNEL_REACH_THICKNESSES * elastomer.thickness_mm + PATCH_REACH * width_mm)
     largest = WAVE_REACH / width_mm

@@ -18,6 +18,7 @@ from cmpdesign.contact.objects.indenters import Indenter
 from cmpdesign.errors import InputError
 from cmpdesign.files.images import ImageFileError, decode_image
 from cmpdesign.inputs.files import read_file
+from cmpdesign.libraries import extra
 
 Array = NDArray[np.float64]
 MOST_HEIGHTS = 25_000_000  # of a height map
@@ -66,7 +67,8 @@ class HeightMap(Indenter):
         return cls(_read_gray(path) * float(depth_mm or 0), pixel_mm, **placed)
 
     def profile_mm(self, x_mm: Array, y_mm: Array) -> Array:
-        from scipy.ndimage import map_coordinates
+        with extra("evaluate"):
+            from scipy.ndimage import map_coordinates
 
         rows, columns = self.heights_mm.shape
         row = (rows - 1) / 2 - np.asarray(y_mm) / self.pixel_mm

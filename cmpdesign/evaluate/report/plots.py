@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 
 COLORS = {
     "square": "#59636b",
@@ -28,13 +28,9 @@ STYLE |= {"axes.spines.right": False, "font.family": "sans-serif", "legend.frame
 @contextmanager
 def _open_figure(width: float, height: float) -> Iterator[tuple[Any, Callable[[], str]]]:
     """A figure's axes, and the function that returns it as SVG."""
-    try:
+    with extra("evaluate"):
         import matplotlib
-    except ModuleNotFoundError as error:
-        raise CmpDesignError(
-            "reports need matplotlib, which is not installed; install cmpdesign[evaluate]"
-        ) from error
-    from matplotlib.figure import Figure
+        from matplotlib.figure import Figure
 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.evaluate.square.quads import Quads, find_quads
 from cmpdesign.layout.layout import Layout
+from cmpdesign.libraries import extra
 from extractor.image.response import Response, light_of_values
 
 Points = NDArray[np.float64]
@@ -71,9 +72,10 @@ def join_corners(corners_px: Points) -> tuple[NDArray[np.int64], Points]:
 
     A corner is joined with every close corner of another quad. A node lies at the mean of its corners.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
+    with extra("evaluate"):
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
 
     points = corners_px.reshape(-1, 2)
     sides = np.linalg.norm(np.roll(corners_px, -1, axis=1) - corners_px, axis=2).min(axis=1)

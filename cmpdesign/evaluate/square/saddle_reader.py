@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.evaluate.square.contour_reader import Gray, SquareReader, gray_light, refine_corners
+from cmpdesign.libraries import extra
 
 Points = NDArray[np.float64]
 SMOOTHING_EDGES = 0.08  # sigma of the Gaussian before the second derivatives, in edges
@@ -101,7 +102,8 @@ def grow_lattice(
         side: corners along a side of the pattern.
         cell: (2, 2) px, the default offsets to the next column and to the next row.
     """
-    from scipy.spatial import cKDTree
+    with extra("evaluate"):
+        from scipy.spatial import cKDTree
 
     if not len(saddles.xy_px):
         return start

@@ -102,14 +102,16 @@ def cut_by_later(outlines_mm: Sequence[Points]) -> list[Points]:
     """What stays of each cell when the cells are made one after the other, and a later cell replaces earlier ones.
 
     Args:
-        outlines_mm: (K, 2) simple outlines in the order of making.
+        outlines_mm: (K, 2) outlines in the order of making; what one runs around twice belongs to the cell.
 
     Returns:
         The outline of each cell's largest part.
     """
     import shapely
 
-    cells = shapely.make_valid(np.array([shapely.Polygon(ring) for ring in outlines_mm]))
+    cells = shapely.make_valid(
+        np.array([shapely.Polygon(ring) for ring in outlines_mm]), method="structure", keep_collapsed=False
+    )
     earlier, later = shapely.STRtree(cells).query(cells, predicate="intersects")
     found = list(outlines_mm)
     for cell in np.unique(earlier[later > earlier]).tolist():

@@ -14,6 +14,7 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.side import seen_side
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.products.as_made.made_pad import MadePad, make_pad
+from cmpdesign.watch import told
 
 if TYPE_CHECKING:
     from extractor.presets import Preset
@@ -134,7 +135,8 @@ def read_pads(
     from cmpdesign.files.layout_json import layout_to_json
 
     found = PadReadings({}, [], {}, {})
-    for pad in pads:
+    every = list(pads)
+    for pad in told(every, len(every), "pads"):
         found.figures[pad.product] = pad.figures()
         if pad.nominal.cell_corners.shape[1] == 3:
             reading = read_pad(pad, camera_px, preset)

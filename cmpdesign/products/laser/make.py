@@ -21,6 +21,7 @@ from cmpdesign.products.laser.job import make_job
 from cmpdesign.products.laser.job_sheet import job_sheet_html
 from cmpdesign.products.laser.setup import complete_setup
 from cmpdesign.products.registry import ProductFiles
+from cmpdesign.watch import tell
 
 FOLDER = "laser"
 FORMATS: Mapping[str, Callable[[LaserDrawing], str]] = {
@@ -52,7 +53,10 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
     job = make_job(design.name, layout, complete_setup(design.laser))
     warnings = require_no_errors(setup_findings(design, job))
     require_no_errors(path_findings(job))
+    drawn = len(job.passes) + 2  # a drawing a pass, one of all, one of the coupon
+    tell(1, drawn + 3)
     figures = measure_as_made(job)
+    tell(2, drawn + 3)
     warnings += require_no_errors(as_made_findings(job, figures))
     timings = tuple(pass_timing(job, laser_pass) for laser_pass in job.passes)
     files: dict[str, str | bytes] = {}
@@ -60,8 +64,11 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
     drawings = {laser_pass.name: all_passes.with_one_pass(laser_pass) for laser_pass in job.passes}
     drawings["job"] = all_passes
     drawings["coupon"], files[f"{FOLDER}/coupon.json"] = coupon_job(job.setup)
-    for name, drawing in drawings.items():
+    for number, (name, drawing) in enumerate(drawings.items(), start=1):
         files |= {f"{FOLDER}/{name}.{suffix}": write(drawing) for suffix, write in FORMATS.items()}
+        tell(2 + number, drawn + 3)
     files[f"{FOLDER}/as-made.svg"] = as_made_svg(job)
     files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(job, figures, timings)
-    return ProductFiles(files, job_figures(job, figures, timings), warnings, made_pad=made_pad(job))
+    made = ProductFiles(files, job_figures(job, figures, timings), warnings, made_pad=made_pad(job))
+    tell(drawn + 3, drawn + 3)
+    return made

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 
 # The library's identifiers and the package's dates differ from run to run by default. These follow from names.
@@ -24,7 +25,8 @@ def meshes_to_3mf(meshes: Sequence[TriangleMesh], title: str) -> bytes:
     Raises:
         RuntimeError: lib3mf reports a mesh that is not closed or not consistently wound.
     """
-    import lib3mf
+    with extra("cad"):
+        import lib3mf
 
     model = lib3mf.get_wrapper().CreateModel()
     model.SetUnit(lib3mf.ModelUnit.MilliMeter)
@@ -87,7 +89,8 @@ def read_3mf(package: bytes) -> list[ObjectCounts]:
     Raises:
         RuntimeError: strict mode gives a warning.
     """
-    import lib3mf
+    with extra("cad"):
+        import lib3mf
 
     model = lib3mf.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")

@@ -1,6 +1,6 @@
 """The mold and the pad as build123d objects, to go on from in CAD: a flange, a camera mount, a housing.
 
-build123d is an optional dependency (``pip install "cmpdesign[cad]"``). The plain build does not use it: the kernel's
+build123d belongs to the extra [cad]. The plain build does not use it: the kernel's
 exporter takes several times as long as ``step``, and the assemblies that it writes differ from run to run.
 """
 
@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from cmpdesign.design.design import Design
-from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
+from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.mold.checks.findings import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import check_part
@@ -103,12 +103,8 @@ def _silicone_layers(pad: MoldStack) -> Iterator[_PlacedSolid]:
 
 
 def _compound(label: str, solids: Sequence[_PlacedSolid]) -> Any:
-    try:
+    with extra("cad"):
         from build123d import Color, Compound, Location, Solid
-    except ModuleNotFoundError:
-        raise CmpDesignError(
-            'build123d is not installed; install it with pip install "cmpdesign[cad]"'
-        ) from None
     children = []
     for one in solids:
         child = Solid(one.shape).moved(Location(one.xyz_mm, (180.0 if one.turned else 0.0, 0.0, 0.0)))

@@ -5,7 +5,7 @@ Parts do not depend on each other, and each part has its own document, so its by
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -46,10 +46,11 @@ def finish_parts(design: Design, layout: Layout, parts: Sequence[Part]) -> dict[
     return results_of_parts(f"{__name__}:finish_named_parts", design, layout, parts)
 
 
-def finish_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> list[FinishedPart]:
-    """As ``finish_parts`` in this process, for the parts of these names."""
+def finish_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> Iterator[FinishedPart]:
+    """As ``finish_parts`` in this process, for the parts of these names, one after the other."""
     parts = {part.name: part for part in make_parts(make_stack(design, layout))}
-    return [finish_part(parts[name]) for name in names]
+    for name in names:
+        yield finish_part(parts[name])
 
 
 def finish_part(part: Part) -> FinishedPart:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from importlib import import_module
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from cmpdesign.design.design import Design
 from cmpdesign.files.images import to_png
 from cmpdesign.layout.layout import Layout
+from cmpdesign.libraries import extra, require_libraries
 from cmpdesign.products.mesh.glb import meshes_to_glb
 from cmpdesign.products.mesh.stl import mesh_to_stl
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf
@@ -45,8 +45,7 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
         DesignError: the mold cannot be made.
         MoldError: a mesh is open, inconsistently wound or of another volume than computed.
     """
-    for library in ("trimesh", "lib3mf"):  # a missing one is an error before the work
-        import_module(library)
+    require_libraries("cad", "OCP", "trimesh", "lib3mf", "scipy")
     stack = make_stack(design, layout)
     findings = check_mold(stack)
     require_no_errors(findings)
@@ -79,10 +78,11 @@ class PartMesh(NamedTuple):
     tolerance: float
 
 
-def mesh_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> list[PartMesh]:
-    """The triangle meshes of the parts of these names."""
+def mesh_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> Iterator[PartMesh]:
+    """The triangle meshes of the parts of these names, one after the other."""
     parts = {part.name: part for part in make_parts(make_stack(design, layout))}
-    return [make_part_mesh(parts[name]) for name in names]
+    for name in names:
+        yield make_part_mesh(parts[name])
 
 
 def make_part_mesh(part: Part) -> PartMesh:
@@ -116,7 +116,8 @@ def _add_checked_figures(
     Raises:
         MoldError: see ``make_meshes``.
     """
-    import trimesh
+    with extra("cad"):
+        import trimesh
 
     body = trimesh.Trimesh(mesh.points, mesh.triangles, process=False)
     error = abs(float(mesh.volume_mm3()) / volume_mm3 - 1)

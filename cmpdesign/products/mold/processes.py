@@ -13,15 +13,19 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from importlib import import_module
+from queue import SimpleQueue
+from tempfile import TemporaryFile
+from threading import Thread
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 from cmpdesign.design.design import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.products.mold.parts import Part
+from cmpdesign.watch import tell, told
 
 # Starting a process and loading the kernel in it takes as long as some hundred bosses.
 MIN_BOSSES_FOR_TWO = 400
@@ -40,8 +44,8 @@ def results_of_parts(function: str, design: Design, layout: Layout, parts: Seque
     """Call a function for the parts of a design, in one or two processes.
 
     Args:
-        function: "module:name" of a function that takes a design, its layout and names of parts, and returns a list
-            of one picklable result a part.
+        function: "module:name" of a function that takes a design, its layout and names of parts, and yields one
+            picklable result a part.
         design: the design.
         layout: its layout.
         parts: the parts.
@@ -56,7 +60,8 @@ def results_of_parts(function: str, design: Design, layout: Layout, parts: Seque
     if not sys.executable:  # an embedded interpreter
         module, _, name = function.partition(":")
         names = [part.name for part in parts]
-        return dict(zip(names, getattr(import_module(module), name)(design, layout, names), strict=True))
+        made = getattr(import_module(module), name)(design, layout, names)
+        return dict(zip(names, told(made, len(names)), strict=True))
     groups = [[part.name for part in group] for group in _split_work(parts) if group]
     results = _run([PartsTask(function, design, layout, group) for group in groups])
     by_name = {
@@ -94,38 +99,89 @@ def _boss_count(part: Part) -> int:
     return curved + len(part.slab.many) + len(part.slab.many_through)
 
 
-def _run(tasks: Sequence[PartsTask]) -> list[Any]:
-    """The result of every task, each from its own process; all processes have ended, whatever happens."""
+class _Message(NamedTuple):
+    """What a process sent: the process' number, and a result, an error or ``_END``."""
+
+    process: int
+    content: Any
+
+
+_END = object()
+
+
+def _run(tasks: Sequence[PartsTask]) -> list[list[Any]]:
+    """The results of every task, each from its own process; all processes have ended, whatever happens."""
+    messages: SimpleQueue[_Message] = SimpleQueue()
+    with ExitStack() as stack:
+        errors = [stack.enter_context(TemporaryFile()) for _ in tasks]
+        processes = [_start(stack, error, messages, number) for number, error in enumerate(errors)]
+        for process, task in zip(processes, tasks, strict=True):
+            assert process.stdin is not None
+            # A process that ends at once is reported below.
+            with suppress(BrokenPipeError), process.stdin as stream:
+                stream.write(_pickle_task(task))
+        return _collect(tasks, messages, errors)
+
+
+def _start(
+    stack: ExitStack, errors: IO[bytes], messages: SimpleQueue[_Message], number: int
+) -> subprocess.Popen[bytes]:
+    """Start a process that is killed when the stack is left, and a thread that forwards what the process sends."""
     # multiprocessing is not used, because it would import the caller's script again.
     command = [sys.executable, "-P", "-c", f"from {__name__} import helper; helper()"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)}
     pipe = subprocess.PIPE
-    processes: list[subprocess.Popen[bytes]] = []
-    try:
-        for task in tasks:
-            process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, env=environment)
-            processes.append(process)
-            assert process.stdin is not None
-            # The return code below reports a process that ends at once.
+    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=errors, env=environment)
+    forwarder = Thread(target=_forward, args=(process, messages, number), daemon=True)
+
+    def end() -> None:
+        process.kill()
+        process.wait()
+        forwarder.join()
+        for stream in (process.stdin, process.stdout):
+            assert stream is not None
             with suppress(BrokenPipeError):
-                process.stdin.write(_pickle_task(task))
-                process.stdin.flush()
-        return [_result_of(process) for process in processes]
-    finally:
-        for process in processes:
-            process.kill()
-            with process:
-                pass
+                stream.close()
+
+    stack.callback(end)
+    forwarder.start()
+    return process
 
 
-def _result_of(process: subprocess.Popen[bytes]) -> Any:
-    output, errors = process.communicate()
-    if process.returncode:
-        raise RuntimeError(f"mold: a process failed: {errors.decode(errors='replace')}")
-    result = pickle.loads(output)
-    if isinstance(result, BaseException):
-        raise result
-    return result
+def _forward(process: subprocess.Popen[bytes], messages: SimpleQueue[_Message], number: int) -> None:
+    assert process.stdout is not None
+    # A stream that breaks off in a result is an early end, too.
+    with suppress(EOFError, pickle.UnpicklingError):
+        while True:
+            messages.put(_Message(number, pickle.load(process.stdout)))
+    messages.put(_Message(number, _END))
+
+
+def _collect(
+    tasks: Sequence[PartsTask], messages: SimpleQueue[_Message], errors: Sequence[IO[bytes]]
+) -> list[list[Any]]:
+    """The results of every task in its order.
+
+    Raises:
+        CmpDesignError, ModuleNotFoundError: as a process sent it.
+        RuntimeError: a process ended early; with what it wrote to standard error.
+    """
+    results: list[list[Any]] = [[] for _ in tasks]
+    total = sum(len(task.names) for task in tasks)
+    running = len(tasks)
+    while running:
+        number, content = messages.get()
+        if isinstance(content, BaseException):
+            raise content
+        if content is not _END:
+            results[number].append(content)
+            tell(sum(map(len, results)), total)
+            continue
+        running -= 1
+        if len(results[number]) < len(tasks[number].names):
+            errors[number].seek(0)
+            raise RuntimeError(f"mold: a process failed: {errors[number].read().decode(errors='replace')}")
+    return results
 
 
 def _pickle_task(task: PartsTask) -> bytes:
@@ -138,18 +194,18 @@ def _pickle_task(task: PartsTask) -> bytes:
 
 
 def helper() -> None:
-    """One of the processes: reads a pickled task from standard input, writes the pickled result to standard output."""
+    """One of the processes: reads a pickled task from standard input, writes pickled results to standard output."""
     # Ctrl-C reaches all processes of a terminal; the process that waits ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     output = os.fdopen(os.dup(1), "wb")
     # Messages of the kernel go to standard error.
     os.dup2(2, 1)
-    result: Any
-    try:
-        task: PartsTask = pickle.load(sys.stdin.buffer)
-        module, _, name = task.function.partition(":")
-        result = getattr(import_module(module), name)(task.design, task.layout, task.names)
-    except (CmpDesignError, ModuleNotFoundError) as error:
-        result = error
     with output:
-        pickle.dump(result, output)
+        try:
+            task: PartsTask = pickle.load(sys.stdin.buffer)
+            module, _, name = task.function.partition(":")
+            for result in getattr(import_module(module), name)(task.design, task.layout, task.names):
+                pickle.dump(result, output)
+                output.flush()
+        except (CmpDesignError, ModuleNotFoundError) as error:
+            pickle.dump(error, output)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.libraries import extra
+
 DECIMALS = 6
 POINTS_PER_MM = 72 / 25.4
 
@@ -81,8 +83,9 @@ def _svg_text(drawing: Any, item: TextLine) -> Any:
 
 def page_to_pdf(page: Page) -> bytes:
     """Format the page as PDF at true size, without a date: the same bytes for the same page."""
-    from reportlab.lib.colors import HexColor
-    from reportlab.pdfgen.canvas import Canvas
+    with extra("print"):
+        from reportlab.lib.colors import HexColor
+        from reportlab.pdfgen.canvas import Canvas
 
     result = io.BytesIO()
     size = (page.width_mm * POINTS_PER_MM, page.height_mm * POINTS_PER_MM)

@@ -13,6 +13,7 @@ from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.outline import corner_offsets
 from cmpdesign.layout.side import seen_side
+from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.as_made.made_pad import MadePad, make_pad
 from cmpdesign.products.registry import ProductFiles
@@ -225,7 +226,8 @@ def _hairline_polygon(start: Points, direction: Points) -> Points:
 
 def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPolygons | TextLine]:
     """QR code, scale bars and text, in the lower left corner."""
-    import segno
+    with extra("print"):
+        import segno
 
     parameters = layout.parameters
     name = str(parameters.get("name") or layout.pattern)

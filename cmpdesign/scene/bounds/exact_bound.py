@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.libraries import extra
 from cmpdesign.scene.bounds.gridline_bound import marker_covariances, noisy_sensor
 from cmpdesign.scene.drawing.render import render, render_truth
 from cmpdesign.scene.drawing.view import single_view
@@ -38,7 +39,8 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
     Raises:
         SceneError: the scene has no noise.
     """
-    from scipy.sparse import coo_array
+    with extra("evaluate"):
+        from scipy.sparse import coo_array
 
     sensor = noisy_sensor(scene)
     clean = replace(scene, sensor=Sensor(bits=16, response=sensor.response))
@@ -69,7 +71,8 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
 
 def _separated_groups(edges: NDArray[np.int32], markers: int) -> NDArray[np.int64]:
     """(M,) group numbers: markers of one group are at least ``MIN_SEPARATION_EDGES`` + 1 edges apart (greedy)."""
-    from scipy.sparse import coo_array, eye_array
+    with extra("evaluate"):
+        from scipy.sparse import coo_array, eye_array
 
     one = np.ones(2 * len(edges))
     directed = np.concatenate([edges, edges[:, ::-1]])

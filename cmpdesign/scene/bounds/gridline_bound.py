@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene.camera.pinhole import Area
 from cmpdesign.scene.drawing.render import missing_cell_mask, render_truth
@@ -90,7 +91,8 @@ def _profile_information(sensor: Sensor, light: NDArray[np.float64]) -> NDArray[
         sensor: the sensor.
         light: (E, 2, C) light on both sides.
     """
-    from scipy.special import ndtr
+    with extra("evaluate"):
+        from scipy.special import ndtr
 
     along_normal = np.linspace(-PROFILE_REACH, PROFILE_REACH, PROFILE_NODES)
     density = np.exp(-(along_normal**2)) / (2 * np.pi)
@@ -132,7 +134,8 @@ def _sum_information(
     markers: int,
 ) -> Any:
     """The sparse (2M, 2M) information matrix of all edges, clipped to the view's area."""
-    from scipy.sparse import coo_array
+    with extra("evaluate"):
+        from scipy.sparse import coo_array
 
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1)
@@ -175,8 +178,9 @@ def _clip_to_area(ends: NDArray[np.float64], area: Area) -> tuple[NDArray[np.flo
 
 def marker_covariances(information: Any, truth: Truth) -> NDArray[np.float64]:
     """(M, 2, 2) px^2: the diagonal blocks of the inverse information for the visible markers, NaN for others."""
-    from scipy.sparse import eye_array
-    from scipy.sparse.linalg import splu
+    with extra("evaluate"):
+        from scipy.sparse import eye_array
+        from scipy.sparse.linalg import splu
 
     markers = len(truth.visible)
     solver = splu((information + PRIOR_PER_PX2 * eye_array(2 * markers)).tocsc())

@@ -42,6 +42,14 @@ class Rendered:
     truth: Truth
     warnings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        return f"<Rendered: {width} x {height} px, {self.truth}, {len(self.warnings)} warnings>"
+
+    def _repr_png_(self) -> bytes:
+        """The image, for notebooks."""
+        return encode_image(self.image, Path("a.png"))
+
     def save(self, path: str | Path, truth: str | Path | None = None) -> None:
         """Write the image in the format of the file's ending, and the truth as .npz where a file is given.
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,18 @@ from cmpdesign.scene.parts.background import Background, Picture, Plain
 from cmpdesign.scene.parts.surface import composed
 from cmpdesign.scene.scene import Scene
 
+if TYPE_CHECKING:
+    from cmpdesign.contact import Contact
+
 PointMap = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedScene:
+    """A scene and its contact; None without [contact]."""
+
+    scene: Scene
+    contact: Contact | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +92,14 @@ class SceneFile:
         Raises:
             SceneError: the message names file, table and key.
         """
+        return (solved.scene for solved in self.solved_scenes())
+
+    def solved_scenes(self) -> Iterator[SolvedScene]:
+        """As ``scenes``, each with its contact.
+
+        Raises:
+            SceneError: see ``scenes``.
+        """
         with _errors_with_path(self.path):
             contacts = self._contacts()
             for frame in range(self.frames):
@@ -89,15 +108,16 @@ class SceneFile:
                 parts = list(_make_deformations(tables.surface, self.document))
                 if contact is not None:
                     parts.append(contact.marker_layer())
-                yield Scene(
+                scene = Scene(
                     **_make_parts(tables, self),
                     surface=composed(*parts) if parts else None,
                     seed=tables.seed,
                     frame=frame,
                     warnings=() if contact is None else contact.warnings,
                 )
+                yield SolvedScene(scene, contact)
 
-    def _contacts(self) -> Iterator[Any]:
+    def _contacts(self) -> Iterator[Contact]:
         """The contact of every frame; empty, without importing the solver, if there is no [contact]."""
         if "contact" not in self.document:
             return
@@ -137,9 +157,24 @@ def load_scene(
         document = read_toml(path)
     except InputError as error:
         raise SceneError(str(error)) from None
+    replacements = {"size_px": size_px and list(size_px), "seed": seed}
+    document |= {name: value for name, value in replacements.items() if value is not None}
+    return scene_from_document(document, path, layout)
+
+
+def scene_from_document(document: Mapping[str, Any], path: Path, layout: Layout) -> SceneFile:
+    """Check the document of a scene file, as ``load_scene`` does.
+
+    Args:
+        document: the TOML document.
+        path: where it comes from, for messages; relative paths in the document start at its folder.
+        layout: the pattern.
+
+    Raises:
+        SceneError: a name or value that is not allowed.
+    """
+    document = dict(document)
     with _errors_with_path(path):
-        replacements = {"size_px": size_px and list(size_px), "seed": seed}
-        document |= {name: value for name, value in replacements.items() if value is not None}
         sequence = document.pop("sequence", None)
         if isinstance(sequence, dict) and isinstance(sequence.get("values"), dict):
             sequence = {**sequence, "values": flatten_table(sequence["values"])}

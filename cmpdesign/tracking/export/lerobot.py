@@ -33,6 +33,7 @@ from cmpdesign.tracking.export.runs import Run, read_run, require_one_kind
 from cmpdesign.tracking.export.statistics import ImageStatistics, Statistics, pooled, statistics_of
 from cmpdesign.tracking.export.video import Codec, CodecVideo, require_av
 from cmpdesign.tracking.sinks.unfinished import require_pyarrow
+from cmpdesign.watch import told
 
 PREFIX = "observation.tactile."
 VIDEO_KEY = "observation.images.tactile"
@@ -101,7 +102,7 @@ def _write_folder(folder: Path, runs: Sequence[Path], about: DataSet) -> int:
     features: dict[str, Any] = {}
     first = 0
     try:
-        for episode, run_path in enumerate(runs):
+        for episode, run_path in enumerate(told(runs, len(runs), "runs")):
             run = read_run(run_path)
             arrays = _columns_of(run, episode, first, about.fps)
             row = {"episode_index": episode, "tasks": [about.task], "length": len(run)}

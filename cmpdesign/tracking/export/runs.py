@@ -44,6 +44,10 @@ class Run:
     def __len__(self) -> int:
         return len(self.frame)
 
+    def __repr__(self) -> str:
+        columns = ", ".join(f"{name} {values.shape}" for name, values in self.arrays.items())
+        return f"<Run {self.path.name}: {len(self)} frames; {columns}>"
+
 
 @dataclass(frozen=True)
 class RunKind:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,10 @@ def require_av() -> Any:
     """The module av.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
-    try:
+    with extra("export"):
         import av
-    except ImportError:
-        raise CmpDesignError("video needs av: pip install 'cmpdesign[export]'") from None
     return av
 
 

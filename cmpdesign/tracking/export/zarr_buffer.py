@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.atomic import Stage
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.export.run_images import require_sources, run_images
 from cmpdesign.tracking.export.runs import read_run, require_one_kind
+from cmpdesign.watch import told
 
 PREFIX = "tactile_"
 IMAGE_KEY = "tactile_image"
@@ -28,12 +30,10 @@ def require_zarr() -> Any:
     """The module zarr.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
-    try:
+    with extra("export"):
         import zarr
-    except ImportError:
-        raise CmpDesignError("a replay buffer needs zarr: pip install 'cmpdesign[export]'") from None
     return zarr
 
 
@@ -65,7 +65,7 @@ def write_zarr(
         with Stage(path.parent) as stage:
             staged = stage.folder / "buffer"
             buffer = _Buffer(staged)
-            for place, run_path in enumerate(runs):
+            for place, run_path in enumerate(told(runs, len(runs), "runs")):
                 buffer.add_run(run_path, images[place] if images else None, most_pixels)
             frames = buffer.finish({"format": kind.format, "digest": kind.digest})
             stage.commit(staged, path)

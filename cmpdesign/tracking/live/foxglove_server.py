@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.live.options import HOST
 from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
 from cmpdesign.tracking.recording.topics import TopicMessages
@@ -26,12 +27,10 @@ def require_foxglove() -> Any:
     """The module foxglove.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
-    try:
+    with extra("live"):
         import foxglove
-    except ImportError:
-        raise CmpDesignError("Foxglove needs foxglove-sdk: pip install 'cmpdesign[live]'") from None
     return foxglove
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.recording.frames import CameraView, FrameImage, RecordedFrame
 from cmpdesign.tracking.recording.messages import ERROR, OK, WARN
 from cmpdesign.tracking.recording.points import Records
@@ -34,17 +34,13 @@ def require_rerun() -> Any:
     """The module rerun.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
     os.environ.setdefault(
         "RUST_LOG", "off"
     )  # failures are raised here; its own lines would stand between ours
-    try:
+    with extra("rerun", "write .mcap"):
         import rerun
-    except ImportError:
-        raise CmpDesignError(
-            "Rerun needs rerun-sdk, some 500 MB: pip install 'cmpdesign[rerun]', or write .mcap"
-        ) from None
     return rerun
 
 

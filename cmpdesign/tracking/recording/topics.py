@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
 from cmpdesign.tracking.recording.messages import CAMERA, DIAGNOSTICS, IMAGE, POINTS, Messages, Stamp
 
@@ -34,15 +34,11 @@ def require_rosbags() -> Any:
     """The module rosbags.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
-    try:
+    with extra("recording", "write .npz or .csv"):
         import rosbags.rosbag2
         import rosbags.typesys
-    except ImportError:
-        raise CmpDesignError(
-            "MCAP and rosbag2 need rosbags: pip install 'cmpdesign[recording]', or write .npz or .csv"
-        ) from None
     return rosbags
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.locks import open_for_lock, try_lock
+from cmpdesign.libraries import extra
 
 # Largest time between two flushes to disk, s: frames of this time are lost with the power.
 FLUSH_S = 5.0
@@ -50,15 +50,11 @@ def require_pyarrow() -> Any:
     """The module pyarrow, with pyarrow.parquet.
 
     Raises:
-        CmpDesignError: it is not installed.
+        MissingLibraryError: it is not installed.
     """
-    try:
+    with extra("parquet", "write .npz or .csv"):
         import pyarrow
         import pyarrow.parquet
-    except ImportError:
-        raise CmpDesignError(
-            "Parquet needs pyarrow: pip install 'cmpdesign[parquet]', or write .npz or .csv"
-        ) from None
     return pyarrow
 
 

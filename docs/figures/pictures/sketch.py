@@ -67,6 +67,21 @@ class Sketch:
         self._line_px(tail, base, color, width)
         self._head_px(tip, along, color, width)
 
+    def length(self, start: Point, end: Point, name: str, at: Point, anchor: str = "middle") -> None:
+        """Draw a dimension: thin ends, an arrow to both sides, and the name of the length at ``at``."""
+        ends = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+        along = (ends[1] - ends[0]) / np.hypot(*(ends[1] - ends[0]))
+        across = 7 / self.scale * np.array([-along[1], along[0]])
+        for each in ends:
+            self.line(each - across, each + across, ACCENT, 1.0)
+        if self.scale * np.hypot(*(ends[1] - ends[0])) > 24:
+            middle = (ends[0] + ends[1]) / 2
+            self.arrow(middle, ends[0], ACCENT, 1.2)
+            self.arrow(middle, ends[1], ACCENT, 1.2)
+        else:
+            self.line(*ends, ACCENT, 2.4)
+        self.text(at, name, 12, ACCENT, anchor=anchor, bold=True, halo=PAPER)
+
     def turn(
         self, centre: Point, radius: float, start_deg: float, end_deg: float, color: str = ACCENT
     ) -> None:

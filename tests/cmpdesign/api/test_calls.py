@@ -7,6 +7,7 @@ import json
 import pydoc
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import cv2
@@ -158,6 +159,29 @@ def test_values_show_themselves(design: cmpdesign.Design, image: np.ndarray) -> 
     assert "<script>" not in named._repr_html_()
     nothing = Extractor(design.layout).extract(np.full((100, 100, 3), 90, np.uint8))
     assert "no_color" in repr(nothing) and "white light" in nothing._repr_html_()
+    rendered = cmpdesign.render(design.layout, pitch_px=30)
+    for value in (rendered, rendered.truth, Tracker(design.layout).track(image)):
+        assert len(repr(value)) < 120 and type(value).__name__ in repr(value) and "37" in repr(value)
+    assert rendered._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_report_is_what_the_command_writes(
+    design: cmpdesign.Design, image: np.ndarray, tmp_path: Path
+) -> None:
+    design.layout.write(tmp_path / "layout.json")
+    cv2.imwrite(str(tmp_path / "seen.png"), image)
+    given = (tmp_path / "layout.json", tmp_path / "seen.png")
+    assert run("verify", *given, "--report", tmp_path / "a.zip").exit_code == 0
+    assert cmpdesign.verify(*given, report=tmp_path / "b.zip").verified
+    assert cmpdesign.verify(design.layout, image, report=tmp_path / "c.zip").verified
+    command, call, array = (zipfile.ZipFile(tmp_path / f"{name}.zip") for name in "abc")
+    assert command.namelist() == call.namelist() and len(array.namelist()) == len(call.namelist())
+    for name in command.namelist():
+        same = command.read(name) == call.read(name)
+        assert same or name == "report.json"  # which holds times
+    assert array.read("layout.json") == call.read("layout.json")
+    reports = [json.loads(bundle.read("report.json")) for bundle in (command, call)]
+    assert reports[0]["settings"] == reports[1]["settings"]
 
 
 def test_help_begins_with_what_a_person_needs() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ import jsonschema
 import pytest
 
 from cmpdesign import __version__
-from cmpdesign.design.templates import templates
+from cmpdesign.design.templates import scene_templates, templates
 from cmpdesign.files.earlier_files import LIST_NAME
 from extractor import load_layout
 from tests.support.command import refused, run
@@ -126,6 +127,8 @@ def test_version_and_help() -> None:
     for command in ("templates", "build", "check", "render", "verify", "schema"):
         assert command in run("--help").stdout
         assert run(command, "--help").exit_code == 0
+    shown = re.sub(r"\s+", " ", run("render", "--help").stdout)
+    assert f"scene template: {', '.join(scene_templates())}." in shown
 
 
 @pytest.mark.parametrize(

@@ -45,11 +45,15 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 
 def test_every_command_has_two_examples() -> None:
-    for name, _ in [((), None), *commands()]:
+    groups = sorted({name[:-1] for name, _ in commands()})
+    assert [" ".join(name) for name in groups] == ["", *sorted(GROUPS)]
+    for name in [*groups, *(name for name, _ in commands())]:
         lines = examples(*name)
         assert len(lines) == 2 and lines[0] != lines[1], name
         assert all(line.startswith(" ".join(("cmpdesign", *name))) for line in lines)
         assert all(len(line) <= 110 for line in lines)
+    run_by_commands = {line for name, _ in commands() for line in examples(*name)}
+    assert {line for name in groups if name for line in examples(*name)} <= run_by_commands
 
 
 @pytest.mark.parametrize("line", every_example())

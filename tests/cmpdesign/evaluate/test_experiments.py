@@ -272,6 +272,9 @@ def test_a_bad_sensor_is_one_clear_line(change: tuple[str, str], message: str) -
 def test_bad_choices_are_one_line(tmp_path: Path) -> None:
     for arguments, message in (
         (("response", "-o", tmp_path, "--sensor", "tac4d"), "did you mean tac3d?"),
-        (("response", "-o", tmp_path, "--preset", "best"), "unknown; there are fast"),
+        (
+            ("response", "-o", tmp_path, "--preset", "best"),
+            "--preset': 'best' is not one of 'fast', 'balanced'",
+        ),
     ):
         assert message in evaluate(*arguments, code=2)

@@ -37,6 +37,7 @@ MAY_WRITE = {
     "cmpdesign/tracking/recording/images.py": "beside the chunks of a run, which grow under a lock",
     "cmpdesign/products/mold/step/step.py": "a temporary folder for the kernel's own reader",
     "cmpdesign/products/mesh/three_mf.py": "an archive in memory",
+    "cmpdesign/reading/problem_report.py": "an archive in memory",
 }
 WRITING_CALLS = {
     "write_text",

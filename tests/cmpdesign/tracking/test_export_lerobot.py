@@ -184,7 +184,7 @@ def test_without_av_one_line_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     command = ("export", "lerobot", made / "a.npz", "-o", tmp_path / "d")
-    assert "pip install 'cmpdesign[export]'" in refused(*command, "--images", made / "video.avi")
+    assert "of the extra [export]" in refused(*command, "--images", made / "video.avi")
     assert run(*command).exit_code == 0
 
 

@@ -227,7 +227,7 @@ def test_without_rosbags_one_line_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "rosbags", None)
     line = refused("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.mcap")
-    assert "pip install 'cmpdesign[recording]'" in line and list(tmp_path.iterdir()) == []
+    assert "of the extra [recording]" in line and list(tmp_path.iterdir()) == []
 
 
 def test_views_with_an_image_each_have_their_own_topics(press: Path, tmp_path: Path) -> None:

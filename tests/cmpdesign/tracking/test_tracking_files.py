@@ -300,12 +300,19 @@ def test_bad_input_is_one_line_and_no_file(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_a_photo_in_a_phones_own_format_says_what_to_do(made: Path, tmp_path: Path) -> None:
+    photo = tmp_path / "IMG_0001.HEIC"
+    photo.write_bytes(b"\0\0\0\x18ftypheic")
+    line = refused("track", made / "layout.json", photo, "-o", tmp_path / "a.npz")
+    assert "photos of this format are not read; expected JPEG" in line and "Most Compatible" in line
+
+
 def test_parquet_without_pyarrow_says_how_to_get_it(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     line = refused("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.parquet")
-    assert "pip install 'cmpdesign[parquet]'" in line and list(tmp_path.iterdir()) == []
+    assert "of the extra [parquet]" in line and list(tmp_path.iterdir()) == []
 
 
 def test_tables_of_one_name_have_their_own_summaries(made: Path, tmp_path: Path) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import typer
 
-from cmpdesign.cli.command import Command, examples
+from cmpdesign.cli.command import Command, Group, examples
 from cmpdesign.cli.commands.calibrate import pattern
 
 app = typer.Typer(
+    cls=Group,
+    epilog=examples(*pattern.EXAMPLES),
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Measure what one sensor is like, from its pictures.",

@@ -31,7 +31,7 @@ def pattern(
     images: Annotated[
         list[str],
         typer.Argument(
-            metavar="IMAGE...",
+            metavar="IMAGE",
             help='10 or more color pictures of one pad at rest, folders, or patterns such as "rest/*.png".',
         ),
     ],
@@ -48,10 +48,11 @@ def pattern(
     """Measure where the markers of one pad were made; read the pad's pictures with the written layout."""
     from cmpdesign.api.workshop import calibrate_pattern
     from cmpdesign.cli.documents.reading import CalibratePatternDocument
+    from cmpdesign.watch import watched
 
     require_suffix("--output", output, [".json"])
     known = parse_reading_response(response)
-    with working("reading pictures"):
+    with working("reading pictures") as steps, watched(steps.tell):
         learnt = calibrate_pattern(
             layout, images, output, preset=preset, response=known, max_pixels=max_pixels
         )

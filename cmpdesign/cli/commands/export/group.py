@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import typer
 
-from cmpdesign.cli.command import Command, examples
+from cmpdesign.cli.command import Command, Group, examples
 from cmpdesign.cli.commands.export import lerobot, zarr
 
 app = typer.Typer(
+    cls=Group,
+    epilog=examples(lerobot.EXAMPLES[0], zarr.EXAMPLES[0]),
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Export runs as data sets for the training of policies.",

@@ -34,16 +34,17 @@ def lerobot(
     images: ImagesOption = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Write a data set that LeRobot loads: displacement, position and status of every marker, on wish images."""
+    """Write a data set that LeRobot loads: displacement, position and status of every marker, and images if given."""
     from cmpdesign.cli.documents.runs import ExportDocument
     from cmpdesign.tracking.export.lerobot import DataSet, write_lerobot
     from cmpdesign.tracking.export.runs import frames_per_second, require_one_kind, tidy_fps
+    from cmpdesign.watch import watched
 
     require_positive("--fps", fps)
     require_one_kind(runs)
     rate = frames_per_second(runs) if fps is None else tidy_fps(fps)
     about = DataSet(rate, task, robot, tuple(images or ()), max_pixels)
-    with working("exporting"):
+    with working("exporting") as steps, watched(steps.tell):
         frames = write_lerobot(runs, output, about)
     _warn_of_uneven_times(runs, rate)
     say(

@@ -9,7 +9,7 @@ import typer
 
 RunsArgument = Annotated[
     list[Path],
-    typer.Argument(metavar="RUN...", help="Files of track or reconstruct, .npz; each is an episode."),
+    typer.Argument(metavar="RUN", help="Files of track or reconstruct, .npz; each is an episode."),
 ]
 
 ImagesOption = Annotated[

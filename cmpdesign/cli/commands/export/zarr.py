@@ -28,12 +28,13 @@ def zarr(
     images: ImagesOption = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Write a replay buffer: data/tactile_* with the frames of all runs, meta/episode_ends."""
+    """Write a replay buffer: data/tactile_* with the frames of all runs, and meta/episode_ends."""
     from cmpdesign.cli.documents.runs import ExportDocument
     from cmpdesign.tracking.export.zarr_buffer import write_zarr
+    from cmpdesign.watch import watched
 
     require_suffix("--output", output, [".zarr"])
-    with working("exporting"):
+    with working("exporting") as steps, watched(steps.tell):
         frames = write_zarr(runs, output, tuple(images or ()), max_pixels)
     say(f"wrote {printable_path(output)}: {len(runs)} episodes, {frames} frames")
     finish(

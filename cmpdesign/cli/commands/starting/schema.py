@@ -15,7 +15,7 @@ def schema(
     command: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[COMMAND...]",
+            metavar="COMMAND",
             help="A command, as in verify, or message for the lines on stderr. [default: a design's TOML file]",
         ),
     ] = None,

@@ -12,11 +12,12 @@ if TYPE_CHECKING:
     from cmpdesign.cli.documents.designs import TemplatesDocument
 
 EXAMPLES = ("cmpdesign templates --kind scenes", "cmpdesign templates --show tac3d")
-Kind = Literal["designs", "scenes", "machines", "materials", "silicones", "sensors"]
+Kind = Literal["designs", "scenes", "plans", "machines", "materials", "silicones", "sensors"]
 # What takes the names of a kind.
 TAKERS = {
     "designs": "for build, check, init --extends and evaluate designs",
     "scenes": "for render --scene",
+    "plans": "for dataset",
     "machines": "for --set laser.machine=NAME",
     "materials": "for --set laser.material=NAME",
     "silicones": "for --set mold.base_silicone=NAME, marker_silicone, cover_silicone",
@@ -47,7 +48,7 @@ def templates(
 ) -> None:
     """List or show what is shipped.
 
-    Templates are designs, scenes, machines, materials, silicones and sensors.
+    Templates are designs, scenes, plans of data sets, machines, materials, silicones and sensors.
     """
     if show is None:
         _list_templates(kind)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.laser.coupon.edges import EdgeValues
 from cmpdesign.products.laser.coupon.picture import Values
 from extractor.image.response import decode_values, encode_light
@@ -256,7 +257,8 @@ def _moved(state: EdgeState, step: _Step, free_exponent: bool) -> EdgeState:
 
 def _edge_share(t: Values, blur_px: float, shape: Values) -> Values:
     """(N,) the share of the opening's light at distances (N,) in px, of an edge of a shape (5,)."""
-    from scipy.special import ndtr
+    with extra("laser"):
+        from scipy.special import ndtr
 
     widths = blur_px * np.exp(shape[0] + np.array([0.0, shape[3], shape[4]]))
     parts = np.exp(np.array([0.0, shape[1], shape[2]]))

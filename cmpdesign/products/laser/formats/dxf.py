@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from cmpdesign import __version__
+from cmpdesign.libraries import extra
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
 from cmpdesign.products.laser.formats.laser_layers import TOOL_LAYER, LaserLayer
 
@@ -19,8 +20,9 @@ FIDUCIAL_LAYER = "T1"
 
 def drawing_to_dxf(drawing: LaserDrawing) -> str:
     """Format the walls of the passes, and the fiducials as circles on the laser layer T1, which is not plotted."""
-    from ezdxf._options import options
-    from ezdxf.filemanagement import new
+    with extra("laser"):
+        from ezdxf._options import options
+        from ezdxf.filemanagement import new
 
     # The option omits dates and random identifiers: the same bytes for the same job.
     fixed, options.write_fixed_meta_data_for_testing = options.write_fixed_meta_data_for_testing, True

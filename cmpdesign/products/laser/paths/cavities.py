@@ -21,6 +21,8 @@ from cmpdesign.products.laser.paths.kerf import inset_polygons, polygon_areas
 CornerMode = Literal["plain", "overcut"]
 # Points of the arc around a corner or a spur's tip.
 ARC_POINTS = 25
+# On shorter sides of a path, in beam units, the burns of two spurs may overlap.
+SHORT_SIDE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +98,10 @@ def make_cavities(
 
 
 def burnt_areas_mm2(cavities: Cavities, beam: BeamFootprint) -> NDArray[np.float64]:
-    """(N,) areas of the holes, exact: in beam units area + perimeter + pi (Steiner's formula) + the spurs' gain."""
+    """(N,) areas of the holes: in beam units area + perimeter + pi (Steiner's formula) + the spurs' gain.
+
+    The formula is exact. Where the burns of two spurs overlap, the area is that of ``burnt_shapes``.
+    """
     if beam.is_point:
         return polygon_areas(cavities.path_mm)
     spurs = _spur_geometry(cavities, beam)
@@ -104,16 +109,33 @@ def burnt_areas_mm2(cavities: Cavities, beam: BeamFootprint) -> NDArray[np.float
     next_corner = np.roll(path, -1, axis=1)
     area = (path[..., 0] * next_corner[..., 1] - next_corner[..., 0] * path[..., 1]).sum(axis=1) / 2
     side = next_corner - path
-    perimeter = np.hypot(side[..., 0], side[..., 1]).sum(axis=1)
+    length = np.hypot(side[..., 0], side[..., 1])
+    perimeter = length.sum(axis=1)
     after, before = half_angles(path, spurs.direction)
     gain = (spur_area(after, spurs.length) + spur_area(before, spurs.length)).sum(axis=1)
-    return np.asarray(beam.area_factor * (area + perimeter + np.pi + gain))
+    areas = np.asarray(beam.area_factor * (area + perimeter + np.pi + gain))
+    short = np.flatnonzero(length.min(axis=1) < SHORT_SIDE)
+    if len(short):
+        _update_overlapped_areas(areas, cavities, beam, short)
+    return areas
+
+
+def _update_overlapped_areas(
+    areas: NDArray[np.float64], cavities: Cavities, beam: BeamFootprint, short: NDArray[np.int64]
+) -> None:
+    """Replace the areas of those cavities among ``short`` whose outlines cross themselves."""
+    import shapely
+
+    outlines = burnt_outlines_mm(cavities.selected(short), beam)
+    overlaps = ~shapely.is_valid(shapely.polygons(outlines))
+    areas[short[overlaps]] = shapely.area(burnt_shapes(outlines[overlaps]))
 
 
 def burnt_outlines_mm(cavities: Cavities, beam: BeamFootprint) -> Points:
     """(N, K * (2 + ARC_POINTS), 2) outlines of the holes, counter-clockwise, with points on the true curve.
 
-    For a beam without width (N, K, 2), the paths.
+    For a beam without width (N, K, 2), the paths. Where the burns of two spurs overlap, which needs a side of the path
+    that is shorter than half the kerf, an outline crosses itself; ``burnt_shapes`` gives the hole.
     """
     if beam.is_point:
         return cavities.path_mm
@@ -150,6 +172,16 @@ def burnt_outlines_mm(cavities: Cavities, beam: BeamFootprint) -> Points:
         path[:, :, None] + along[..., None] * direction[:, :, None] + across[..., None] * left[:, :, None]
     )
     return beam.to_millimetres(points.reshape(len(path), -1, 2))
+
+
+def burnt_shapes(outlines: Points) -> NDArray[np.object_]:
+    """(N,) holes as valid shapes of (N, P, 2) outlines: what an outline runs around once or twice is burnt."""
+    import shapely
+
+    shapes = np.asarray(shapely.polygons(outlines), dtype=np.object_)
+    crossing = ~shapely.is_valid(shapes)
+    shapes[crossing] = shapely.make_valid(shapes[crossing], method="structure", keep_collapsed=False)
+    return shapes
 
 
 class _SpurGeometry(NamedTuple):

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.laser.paths.beam import Points
 
 BurnOrder = Literal["travel", "heat", "given"]
@@ -41,7 +42,8 @@ def spread_order(centre_mm: Points) -> Ints:
     The cells form groups such that no two cells of a neighbourhood share a group. The groups are burnt one after the
     other, each in the same rows, so that two neighbours are about a whole group apart in the order.
     """
-    from scipy.spatial import cKDTree
+    with extra("laser"):
+        from scipy.spatial import cKDTree
 
     if len(centre_mm) < 3:
         return np.arange(len(centre_mm))
@@ -61,7 +63,8 @@ def shortest_pause(order: Ints, centre_mm: Points, times_s: NDArray[np.float64])
         centre_mm: (N, 2) centre of each cell.
         times_s: (N,) start time of each cell, in burning order.
     """
-    from scipy.spatial import cKDTree
+    with extra("laser"):
+        from scipy.spatial import cKDTree
 
     if len(order) < 2:
         return float("inf")

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign._native import tour as native
+from cmpdesign.libraries import extra
 from cmpdesign.products.laser.paths.beam import Points
 
 Ints = NDArray[np.int64]
@@ -79,7 +80,8 @@ def tour_length_mm(entries_mm: Points, order: Ints, entry: Ints) -> float:
 
 def _nearest_neighbours(centre_mm: Points) -> Ints:
     """(N, n) the nearest cells of each cell, the nearest first."""
-    from scipy.spatial import cKDTree
+    with extra("laser"):
+        from scipy.spatial import cKDTree
 
     count = min(NEIGHBOURS + 1, len(centre_mm))
     _, nearest = cKDTree(centre_mm).query(centre_mm, k=count)

@@ -7,11 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
-from cmpdesign.products.laser.paths.cavities import Cavities
+from cmpdesign.products.laser.paths.cavities import Cavities, burnt_shapes
 
 # Decimals in mm to which pairs of cavities are compared: copies are measured once.
 SAME_DECIMALS = 6
+# Distance of the points of an outline at which depths are measured.
+DEPTH_STEP_MM = 0.02
 
 
 def smallest_web_mm(
@@ -48,24 +51,23 @@ def smallest_web_mm(
     pairs = pairs[gap - wide <= gap.min() - narrow]
     burnt = np.concatenate(outlines)
     pairs = _distinct_pairs(pairs, burnt)
-    shapes = shapely.polygons(burnt[np.unique(pairs)])
+    shapes = burnt_shapes(burnt[np.unique(pairs)])
     index = np.searchsorted(np.unique(pairs), pairs)
     return float(shapely.distance(shapes[index[:, 0]], shapes[index[:, 1]]).min())
 
 
 def burn_depth_mm(outlines: Points, filled: Points) -> float:
-    """Largest depth of burnt outlines in filled outlines: the distance of a burnt point from the filled one's rim."""
+    """Largest depth of burnt outlines in filled outlines: the distance of a burnt point from the filled one's rim.
+
+    Points of the outlines are compared, ``DEPTH_STEP_MM`` apart or less.
+    """
     import shapely
 
-    burnt, cured = shapely.polygons(outlines), shapely.polygons(filled)
-    tree = shapely.STRtree(cured)
-    one, other = tree.query(burnt, predicate="intersects")
-    deepest = 0.0
-    for a, b in zip(burnt[one], cured[other], strict=True):
-        points = shapely.points(shapely.get_coordinates(shapely.intersection(a, b)))
-        rim = shapely.boundary(b)
-        deepest = max(deepest, float(shapely.distance(points, rim).max(initial=0.0)))
-    return deepest
+    burnt, cured = burnt_shapes(outlines), burnt_shapes(filled)
+    meeting = np.unique(shapely.STRtree(cured).query(burnt, predicate="intersects")[0])
+    points = shapely.points(shapely.get_coordinates(shapely.segmentize(burnt[meeting], DEPTH_STEP_MM)))
+    inside, around = shapely.STRtree(cured).query(points, predicate="within")
+    return float(shapely.distance(points[inside], shapely.boundary(cured)[around]).max(initial=0.0))
 
 
 def _cavity_lines(group: Cavities) -> NDArray[np.object_]:
@@ -77,7 +79,8 @@ def _cavity_lines(group: Cavities) -> NDArray[np.object_]:
 
 def _neighbour_pairs(groups: Sequence[Cavities], reach_mm: float, across: bool) -> NDArray[np.int64]:
     """(P, 2) int64 indices of cavities, counted through all groups, whose centres lie within reach."""
-    from scipy.spatial import cKDTree
+    with extra("laser"):
+        from scipy.spatial import cKDTree
 
     centres = [group.nominal_mm.mean(axis=1) for group in groups]
     size = max(

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.mold.stack.crown import END_SLOPE, Crown
 
 
 def solid_with_cap(solid: Any, crown: Crown, raised: bool) -> Any:
     """Unite a solid with the crown's cap over z = 0 (``raised``), or cut the cap out of the solid."""
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
+    with extra("cad"):
+        from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
+        from OCP.TopAbs import TopAbs_ShapeEnum
+        from OCP.TopExp import TopExp_Explorer
+        from OCP.TopoDS import TopoDS
 
     operation = BRepAlgoAPI_Fuse if raised else BRepAlgoAPI_Cut
     shape = operation(solid, cap_solid(crown)).Shape()
@@ -21,10 +23,15 @@ def solid_with_cap(solid: Any, crown: Crown, raised: bool) -> Any:
 
 def cap_solid(crown: Crown) -> Any:
     """The cap as a solid, its foot at z = 0."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
-    from OCP.GC import GC_MakeArcOfCircle
-    from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Vec
+    with extra("cad"):
+        from OCP.BRepBuilderAPI import (
+            BRepBuilderAPI_MakeEdge,
+            BRepBuilderAPI_MakeFace,
+            BRepBuilderAPI_MakeWire,
+        )
+        from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
+        from OCP.GC import GC_MakeArcOfCircle
+        from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Vec
 
     sphere = crown.shape == "sphere"
     y = 0.0 if sphere else -crown.length_mm
@@ -52,10 +59,11 @@ def cap_solid(crown: Crown) -> Any:
 
 def _cut_cylinder_ends(bar: Any, crown: Crown) -> Any:
     """A cylindrical cap, cut off by the leaning planes of its ends."""
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
-    from OCP.gp import gp_Pnt, gp_Vec
+    with extra("cad"):
+        from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+        from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
+        from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+        from OCP.gp import gp_Pnt, gp_Vec
 
     # A prism of trapezoidal section along x, 1 mm wider and higher than the cap.
     half_width, top, end = crown.reach_mm + 1.0, crown.height_mm + 1.0, crown.length_mm

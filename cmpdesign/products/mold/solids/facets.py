@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.mold.solids.loops import Points
 from cmpdesign.products.mold.solids.shells import (
     TOLERANCE_MM,
@@ -40,9 +41,10 @@ class FacetBuilder:
 
     def add_face(self, wires: Iterable[Sequence[int]]) -> None:
         """Add a face: the outer wire counter-clockwise as seen from outside, then the holes clockwise."""
-        from OCP.Geom import Geom_Plane
-        from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
-        from OCP.TopoDS import TopoDS_Face
+        with extra("cad"):
+            from OCP.Geom import Geom_Plane
+            from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
+            from OCP.TopoDS import TopoDS_Face
 
         wires = list(wires)
         corners = self._points[list(wires[0])]
@@ -56,7 +58,8 @@ class FacetBuilder:
         make.Add(self._builder.shell, face)
 
     def _make_wire(self, corners: Sequence[int]) -> Any:
-        from OCP.TopoDS import TopoDS_Wire
+        with extra("cad"):
+            from OCP.TopoDS import TopoDS_Wire
 
         wire = TopoDS_Wire()
         self._builder.make.MakeWire(wire)
@@ -66,7 +69,8 @@ class FacetBuilder:
         return wire
 
     def _get_edge(self, a: int, b: int) -> Any:
-        from OCP.TopAbs import TopAbs_Orientation
+        with extra("cad"):
+            from OCP.TopAbs import TopAbs_Orientation
 
         if (b, a) in self._edges:
             return self._edges[b, a].Oriented(TopAbs_Orientation.TopAbs_REVERSED)
@@ -78,8 +82,9 @@ class FacetBuilder:
         return self._edges[a, b].Oriented(TopAbs_Orientation.TopAbs_FORWARD)
 
     def _get_vertex(self, number: int) -> Any:
-        from OCP.gp import gp_Pnt
-        from OCP.TopoDS import TopoDS_Vertex
+        with extra("cad"):
+            from OCP.gp import gp_Pnt
+            from OCP.TopoDS import TopoDS_Vertex
 
         if number not in self._vertices:
             vertex = TopoDS_Vertex()

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from cmpdesign.libraries import extra
+
 # Walls are faces that lean against z by less than this.
 LEVEL_DEG = 45.0 - 1e-6
 
@@ -32,8 +34,9 @@ class SolidMeasures:
 
 def measure_solid(shape: Any) -> SolidMeasures:
     """Measure validity, closure, faces and volume of a solid (TopoDS_Shape)."""
-    from OCP.BRepCheck import BRepCheck_Analyzer
-    from OCP.TopAbs import TopAbs_ShapeEnum
+    with extra("cad"):
+        from OCP.BRepCheck import BRepCheck_Analyzer
+        from OCP.TopAbs import TopAbs_ShapeEnum
 
     valid = bool(BRepCheck_Analyzer(shape, True, True).IsValid())
     faces = len(subshapes(shape, TopAbs_ShapeEnum.TopAbs_FACE))
@@ -42,8 +45,9 @@ def measure_solid(shape: Any) -> SolidMeasures:
 
 def volume_mm3(shape: Any) -> float:
     """Volume by integration over the faces; exact for flat faces, to 1e-12 for round faces."""
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
+    with extra("cad"):
+        from OCP.BRepGProp import BRepGProp
+        from OCP.GProp import GProp_GProps
 
     properties = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, properties)
@@ -52,8 +56,9 @@ def volume_mm3(shape: Any) -> float:
 
 def is_closed(shape: Any) -> bool:
     """True when every edge of every shell is used twice, once in each direction."""
-    from OCP.BRep import BRep_Tool
-    from OCP.TopAbs import TopAbs_ShapeEnum
+    with extra("cad"):
+        from OCP.BRep import BRep_Tool
+        from OCP.TopAbs import TopAbs_ShapeEnum
 
     shells = subshapes(shape, TopAbs_ShapeEnum.TopAbs_SHELL)
     return bool(shells) and all(BRep_Tool.IsClosed_s(shell) for shell in shells)
@@ -61,7 +66,8 @@ def is_closed(shape: Any) -> bool:
 
 def subshapes(shape: Any, kind: Any) -> list[Any]:
     """Sub-shapes of a kind (TopAbs_ShapeEnum) in order; a shared sub-shape once for every use."""
-    from OCP.TopExp import TopExp_Explorer
+    with extra("cad"):
+        from OCP.TopExp import TopExp_Explorer
 
     found = []
     explorer = TopExp_Explorer(shape, kind)
@@ -80,10 +86,11 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
         shape: the solid.
         low_mm, high_mm: opposite corners of the box.
     """
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.GeomAbs import GeomAbs_SurfaceType
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopoDS import TopoDS
+    with extra("cad"):
+        from OCP.BRepAdaptor import BRepAdaptor_Surface
+        from OCP.GeomAbs import GeomAbs_SurfaceType
+        from OCP.TopAbs import TopAbs_ShapeEnum
+        from OCP.TopoDS import TopoDS
 
     least, largest = float("inf"), float("-inf")
     for face in subshapes(shape, TopAbs_ShapeEnum.TopAbs_FACE):
@@ -106,9 +113,10 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
 
 def _is_within(face: Any, low_mm: Point, high_mm: Point) -> bool:
     """True when every corner of the face lies in the box, with a tolerance of a micrometre."""
-    from OCP.BRep import BRep_Tool
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopoDS import TopoDS
+    with extra("cad"):
+        from OCP.BRep import BRep_Tool
+        from OCP.TopAbs import TopAbs_ShapeEnum
+        from OCP.TopoDS import TopoDS
 
     for vertex in subshapes(face, TopAbs_ShapeEnum.TopAbs_VERTEX):
         point = BRep_Tool.Pnt_s(TopoDS.Vertex(vertex))
@@ -120,13 +128,15 @@ def _is_within(face: Any, low_mm: Point, high_mm: Point) -> bool:
 
 def distance_mm(first: Any, second: Any) -> float:
     """The least distance between two solids; 0 where they touch or overlap."""
-    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+    with extra("cad"):
+        from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 
     return float(BRepExtrema_DistShapeShape(first, second).Value())
 
 
 def overlap_mm3(first: Any, second: Any) -> float:
     """The volume that two solids share."""
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+    with extra("cad"):
+        from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
 
     return volume_mm3(BRepAlgoAPI_Common(first, second).Shape())

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.mold.solids.planar_faces import PlanarFaces, Point, Wire
 
 # Tolerance of the kernel's vertices, edges and faces.
@@ -16,8 +17,9 @@ class ShellBuilder:
     """Collects the faces of one solid."""
 
     def __init__(self) -> None:
-        from OCP.BRep import BRep_Builder
-        from OCP.TopoDS import TopoDS_Shell
+        with extra("cad"):
+            from OCP.BRep import BRep_Builder
+            from OCP.TopoDS import TopoDS_Shell
 
         self.make = BRep_Builder()
         self.shell = TopoDS_Shell()
@@ -25,7 +27,8 @@ class ShellBuilder:
 
     def solid(self) -> Any:
         """The closed solid (TopoDS_Solid)."""
-        from OCP.TopoDS import TopoDS_Solid
+        with extra("cad"):
+            from OCP.TopoDS import TopoDS_Solid
 
         self.shell.Closed(True)
         solid = TopoDS_Solid()
@@ -63,8 +66,9 @@ class ShellBuilder:
         )
 
     def _add_wall(self, wall: _Wall, outward: bool) -> None:
-        from OCP.TopAbs import TopAbs_Orientation
-        from OCP.TopoDS import TopoDS_Face, TopoDS_Wire
+        with extra("cad"):
+            from OCP.TopAbs import TopAbs_Orientation
+            from OCP.TopoDS import TopoDS_Face, TopoDS_Wire
 
         forward, backward = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
         surface = _wall_surface(wall)
@@ -85,9 +89,10 @@ class ShellBuilder:
 
     def _add_parameter_curves(self, wall: _Wall, geometry: Any, span: _RoundSpan) -> None:
         """Add the edges' curves in the (angle, length) plane of a cylinder or cone, where every edge is straight."""
-        from OCP.Geom2d import Geom2d_Line
-        from OCP.gp import gp_Dir2d, gp_Pnt2d
-        from OCP.TopLoc import TopLoc_Location
+        with extra("cad"):
+            from OCP.Geom2d import Geom2d_Line
+            from OCP.gp import gp_Dir2d, gp_Pnt2d
+            from OCP.TopLoc import TopLoc_Location
 
         identity = TopLoc_Location()
 
@@ -157,8 +162,9 @@ def _wall_surface(wall: _Wall) -> _WallSurface:
 
 def _wall_plane(a: Point, b: Point, top: Point, z: float, top_z: float) -> Any:
     """The plane through a and b at z and top at top_z, its normal to the right of a -> b."""
-    from OCP.Geom import Geom_Plane
-    from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
+    with extra("cad"):
+        from OCP.Geom import Geom_Plane
+        from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
 
     along = (b[0] - a[0], b[1] - a[1])
     rise = (top[0] - a[0], top[1] - a[1], top_z - z)
@@ -173,8 +179,9 @@ def _wall_plane(a: Point, b: Point, top: Point, z: float, top_z: float) -> Any:
 
 def _round_wall_surface(centre: Point, z: float, radius: float, growth: float, height: float) -> Any:
     """A cylinder, or a cone whose radius grows by ``growth`` over ``height``."""
-    from OCP.Geom import Geom_ConicalSurface, Geom_CylindricalSurface
-    from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
+    with extra("cad"):
+        from OCP.Geom import Geom_ConicalSurface, Geom_CylindricalSurface
+        from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
 
     axes = gp_Ax3(gp_Pnt(centre[0], centre[1], z), gp_Dir(0.0, 0.0, 1.0), gp_Dir(1.0, 0.0, 0.0))
     if abs(growth) < TOLERANCE_MM:
@@ -186,8 +193,9 @@ class PlacedFaces:
     """The vertices, edges and faces (TopoDS) of a plane at height z."""
 
     def __init__(self, make: Any, shell: Any, plane: PlanarFaces, z: float, up: bool) -> None:
-        from OCP.gp import gp_Pnt
-        from OCP.TopoDS import TopoDS_Vertex
+        with extra("cad"):
+            from OCP.gp import gp_Pnt
+            from OCP.TopoDS import TopoDS_Vertex
 
         self.plane, self.z = plane, z
         self.vertices = []
@@ -210,8 +218,9 @@ class PlacedFaces:
         first, last = self.vertices[start], self.vertices[end]
         if centre is None:
             return make_straight_edge(make, first, self.xyz(start), last, self.xyz(end))
-        from OCP.Geom import Geom_Circle
-        from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+        with extra("cad"):
+            from OCP.Geom import Geom_Circle
+            from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
         (x0, y0), (x1, y1) = self.plane.points[start], self.plane.points[end]
         angle = float(np.arctan2(y0 - centre[1], x0 - centre[0])) % (2 * np.pi)
@@ -222,10 +231,11 @@ class PlacedFaces:
         return _make_edge(make, curve, first, last, angle, angle + sweep)
 
     def _add_faces(self, make: Any, shell: Any, up: bool) -> None:
-        from OCP.Geom import Geom_Plane
-        from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
-        from OCP.TopAbs import TopAbs_Orientation
-        from OCP.TopoDS import TopoDS_Face
+        with extra("cad"):
+            from OCP.Geom import Geom_Plane
+            from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
+            from OCP.TopAbs import TopAbs_Orientation
+            from OCP.TopoDS import TopoDS_Face
 
         orientation = TopAbs_Orientation.TopAbs_FORWARD if up else TopAbs_Orientation.TopAbs_REVERSED
         surface = Geom_Plane(gp_Ax3(gp_Pnt(0.0, 0.0, self.z), gp_Dir(0.0, 0.0, 1.0), gp_Dir(1.0, 0.0, 0.0)))
@@ -237,8 +247,9 @@ class PlacedFaces:
             make.Add(shell, face.Oriented(orientation))
 
     def _make_wire(self, make: Any, directed_edges: Wire) -> Any:
-        from OCP.TopAbs import TopAbs_Orientation
-        from OCP.TopoDS import TopoDS_Wire
+        with extra("cad"):
+            from OCP.TopAbs import TopAbs_Orientation
+            from OCP.TopoDS import TopoDS_Wire
 
         wire = TopoDS_Wire()
         make.MakeWire(wire)
@@ -256,8 +267,9 @@ def make_straight_edge(
     end: Any,
     end_xyz: tuple[float, float, float],
 ) -> Any:
-    from OCP.Geom import Geom_Line
-    from OCP.gp import gp_Dir, gp_Pnt
+    with extra("cad"):
+        from OCP.Geom import Geom_Line
+        from OCP.gp import gp_Dir, gp_Pnt
 
     dx, dy, dz = (b - a for a, b in zip(start_xyz, end_xyz, strict=True))
     line = Geom_Line(gp_Pnt(*start_xyz), gp_Dir(dx, dy, dz))
@@ -265,8 +277,9 @@ def make_straight_edge(
 
 
 def _make_edge(make: Any, curve: Any, start: Any, end: Any, first: float, last: float) -> Any:
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopoDS import TopoDS_Edge
+    with extra("cad"):
+        from OCP.TopAbs import TopAbs_Orientation
+        from OCP.TopoDS import TopoDS_Edge
 
     edge = TopoDS_Edge()
     make.MakeEdge(edge, curve, TOLERANCE_MM)

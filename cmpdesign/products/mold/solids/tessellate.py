@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.solids.loops import Loop, Points, chorded_pair
 from cmpdesign.products.mold.solids.slab_shells import Feature, Slab
@@ -42,8 +43,9 @@ def _chorded_feature(feature: Feature) -> Feature:
 
 def tessellate_solid(name: str, color: str, solid: Any) -> TriangleMesh:
     """The triangle mesh of a solid (TopoDS_Solid), exact on flat faces; neighbouring faces share their vertices."""
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.TopAbs import TopAbs_ShapeEnum
+    with extra("cad"):
+        from OCP.BRepMesh import BRepMesh_IncrementalMesh
+        from OCP.TopAbs import TopAbs_ShapeEnum
 
     from cmpdesign.products.mold.solids.measure import subshapes
 
@@ -58,10 +60,11 @@ def tessellate_solid(name: str, color: str, solid: Any) -> TriangleMesh:
 def _add_face_triangles(
     face: Any, points: list[tuple[float, float, float]], corners: list[tuple[int, int, int]]
 ) -> None:
-    from OCP.BRep import BRep_Tool
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
+    with extra("cad"):
+        from OCP.BRep import BRep_Tool
+        from OCP.TopAbs import TopAbs_Orientation
+        from OCP.TopLoc import TopLoc_Location
+        from OCP.TopoDS import TopoDS
 
     location = TopLoc_Location()
     triangulation = BRep_Tool.Triangulation_s(TopoDS.Face(face), location)
@@ -86,9 +89,10 @@ def merge_vertices(name: str, color: str, points: Points, corners: NDArray[np.in
         points: (P, 3) mm.
         corners: (T, 3) int64 numbers of points.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
+    with extra("cad"):
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
 
     a, b = cKDTree(points).query_pairs(MERGE_TOLERANCE_MM, output_type="ndarray").T
     adjacency = coo_array((np.ones(len(a), dtype=bool), (a, b)), shape=(len(points), len(points)))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.mold.step.entities import StepEntities, Triple, format_real, format_references
 
 
@@ -26,8 +27,9 @@ def add_solid(solid: Any, entities: StepEntities) -> int:
     Raises:
         RuntimeError: any other solid.
     """
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopoDS import TopoDS
+    with extra("cad"):
+        from OCP.TopAbs import TopAbs_ShapeEnum
+        from OCP.TopoDS import TopoDS
 
     shells = list(_explore(solid, TopAbs_ShapeEnum.TopAbs_SHELL))
     if len(shells) != 1:
@@ -39,7 +41,8 @@ def add_solid(solid: Any, entities: StepEntities) -> int:
 
 
 def _explore(shape: Any, kind: Any) -> Iterator[Any]:
-    from OCP.TopExp import TopExp_Explorer
+    with extra("cad"):
+        from OCP.TopExp import TopExp_Explorer
 
     explorer = TopExp_Explorer(shape, kind)
     while explorer.More():
@@ -51,8 +54,9 @@ class _BoundaryWriter:
     """Adds faces, edges and vertices; keeps the numbers of the edges and vertices that were added."""
 
     def __init__(self, entities: StepEntities) -> None:
-        from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
-        from OCP.TopAbs import TopAbs_Orientation
+        with extra("cad"):
+            from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
+            from OCP.TopAbs import TopAbs_Orientation
 
         self.entities = entities
         self.forward = TopAbs_Orientation.TopAbs_FORWARD
@@ -61,8 +65,9 @@ class _BoundaryWriter:
         self.vertex_map, self.vertex_numbers = ShapeMap(), [0]
 
     def add_face(self, face: Any) -> int:
-        from OCP.BRep import BRep_Tool
-        from OCP.TopoDS import TopoDS, TopoDS_Iterator
+        with extra("cad"):
+            from OCP.BRep import BRep_Tool
+            from OCP.TopoDS import TopoDS, TopoDS_Iterator
 
         surface, same_normal = _add_surface(BRep_Tool.Surface_s(face), self.entities)
         outward = face.Orientation() == self.forward
@@ -80,7 +85,8 @@ class _BoundaryWriter:
 
     def add_loop(self, wire: Any, face: Any) -> int:
         """Add the edges of a wire in order; the number of the EDGE_LOOP."""
-        from OCP.BRepTools import BRepTools_WireExplorer
+        with extra("cad"):
+            from OCP.BRepTools import BRepTools_WireExplorer
 
         oriented_edges = []
         explorer = BRepTools_WireExplorer(wire, face)
@@ -101,8 +107,9 @@ class _BoundaryWriter:
         return self.edge_numbers[index]
 
     def _add_new_edge(self, edge: Any) -> int:
-        from OCP.BRep import BRep_Tool
-        from OCP.TopExp import TopExp
+        with extra("cad"):
+            from OCP.BRep import BRep_Tool
+            from OCP.TopExp import TopExp
 
         curve = BRep_Tool.Curve_s(edge, 0.0, 0.0)
         if curve is None:
@@ -112,7 +119,8 @@ class _BoundaryWriter:
         return self.entities.add(f"EDGE_CURVE('',#{start},#{end},#{_add_curve(curve, self.entities)},.T.)")
 
     def add_vertex(self, vertex: Any) -> int:
-        from OCP.BRep import BRep_Tool
+        with extra("cad"):
+            from OCP.BRep import BRep_Tool
 
         index: int = self.vertex_map.Add(vertex)
         if index == len(self.vertex_numbers):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cmpdesign.libraries import extra
 from cmpdesign.products.mold.step.entities import StepEntities, add_context, add_product, format_real
 from cmpdesign.products.mold.step.shape import add_solid
 
@@ -59,7 +60,8 @@ def _add_color(color: str, body: int, context: int, entities: StepEntities) -> N
 @contextmanager
 def _silenced_output() -> Any:
     """Suppress the reports of the kernel's reader on standard output."""
-    from OCP.Message import Message
+    with extra("cad"):
+        from OCP.Message import Message
 
     messenger = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())
@@ -74,7 +76,8 @@ def _silenced_output() -> Any:
 
 def read_step(data: bytes) -> Any:
     """Read the shape (TopoDS_Shape) of a file with the kernel's own reader, mm."""
-    from OCP.STEPControl import STEPControl_Reader
+    with extra("cad"):
+        from OCP.STEPControl import STEPControl_Reader
 
     with _silenced_output(), tempfile.TemporaryDirectory(prefix="cmpdesign-") as folder:
         path = Path(folder) / "part.step"

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+import shapely.affinity
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
@@ -19,11 +20,13 @@ from cmpdesign.products.laser.paths.cavities import (
     Cavities,
     burnt_areas_mm2,
     burnt_outlines_mm,
+    burnt_shapes,
     make_cavities,
 )
 from cmpdesign.products.laser.paths.corners import balanced_spur_length, corner_residue_area, spur_area
 from cmpdesign.products.laser.paths.fill import hatch_strokes, ring_strokes
 from cmpdesign.products.laser.paths.kerf import inset_outline, inset_polygons, outset_outline, polygon_areas
+from cmpdesign.products.laser.paths.webs import burn_depth_mm
 from tests.support.laser_tools import PIXEL_MM, Points, filled, groups_of, made_job, run_gcode, swept
 
 TRIANGLE = 1.5 * np.array([(0, 0), (1, 0), (0.5, np.sqrt(0.75))])
@@ -62,6 +65,30 @@ def test_burnt_areas_and_outlines_are_exact(cell: Points, kerf_x: float, kerf_y:
         assert outline.is_valid
         # Chords of the corners' arcs stay within a third of a micrometre.
         assert shapely.hausdorff_distance(outline.exterior, expected.exterior) < 3.3e-4
+
+
+@settings(max_examples=40, deadline=None)
+@given(triangles(), st.floats(0.5, 0.99), st.floats(0.7, 1.4), st.sampled_from(["plain", "overcut"]))
+def test_beams_as_wide_as_the_cell_burn_valid_shapes(
+    cell: Points, share: float, ratio: float, corner: str
+) -> None:
+    """Burns of two spurs overlap; a cell's neighbour is burnt into as deep as a general-purpose library says."""
+    inscribed = 4 * polygon_areas(cell)[0] / shapely.Polygon(cell[0]).length
+    front = BeamFootprint.of_kerf(share * inscribed, share * inscribed * ratio)
+    made = make_cavities(np.arange(1), cell, front, corner)  # type: ignore[arg-type]
+    assume(made.exists.all())
+    for beam in (front, front.at_depth(0.05, 1.0)):
+        expected = by_shapely(made, beam)
+        outlines = burnt_outlines_mm(made, beam)
+        (shape,) = burnt_shapes(outlines)
+        assert shape.is_valid and shape.geom_type == "Polygon"
+        assert burnt_areas_mm2(made, beam)[0] == pytest.approx(expected.area, rel=4e-3)
+        assert shapely.hausdorff_distance(shape.exterior, expected.exterior) < 3e-3
+        beside = outlines + (0.4, 0.1)
+        cut = shapely.intersection(expected, shapely.affinity.translate(expected, 0.4, 0.1))
+        deepest = shapely.points(shapely.get_coordinates(shapely.segmentize(cut, 0.01)))
+        rim = shapely.distance(deepest, expected.exterior)
+        assert burn_depth_mm(beside, outlines) == pytest.approx(rim.max(initial=0.0), abs=1e-2)
 
 
 @settings(max_examples=40, deadline=None)

@@ -1,0 +1,226 @@
+"""How fast data sets are made and read, on one and on two workers, and how large they are.
+
+    python -m benchmarks.dataset [--quick] [--json FILE]
+
+"rendered": the shipped plan pressed-objects: every frame is drawn, its contact solved, rendered, encoded as JPEG and
+read. "extracted": the same pictures as videos (FFV1, 640 x 480 px), decoded and read. Frames a second are those of the
+whole command, the start of its workers included; "efficiency" is the rate on two workers over twice that on one. Sizes
+are those of the shards' files. "start" and "a shard without work" are what a scheduler takes itself. The sum for 10
+million frames multiplies these figures; its prices are assumptions, stated beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.support.machine import conditions_text, write_json
+from cmpdesign.data import load
+from cmpdesign.data.run import ShardRange, extract_markers, make_dataset
+from cmpdesign.data.schedule.schedulers import Scheduler, results
+from cmpdesign.data.videos.extraction import Reading
+from cmpdesign.design.templates import find_plan
+from cmpdesign.files.images import to_png
+from cmpdesign.tracking.export.video import Codec, CodecVideo
+from extractor import load_layout
+
+FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 32, 2
+VIDEOS, REPEATS = 2, 4  # every picture is in the videos several times
+EMPTY_SHARDS = 200
+MILLIONS = 10
+CORE_HOUR_USD, GB_MONTH_USD = 0.04, 0.023  # assumed: a spot core and object storage of a large provider, 2025
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Frames a second on one and on two workers."""
+
+    what: str
+    frames: int
+    one: float
+    two: float
+
+    @property
+    def efficiency(self) -> float:
+        return self.two / (2 * self.one)
+
+
+@dataclass(frozen=True)
+class Overhead:
+    """A scheduler without work: time to start, and for each shard."""
+
+    scheduler: str
+    start_s: float
+    ms_a_shard: float
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Bytes of a frame: encoded as JPEG, as PNG, and of its row in the table."""
+
+    jpeg: float
+    png: float
+    table: float
+
+
+def seconds(work: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+def no_watch(done: int, wanted: int) -> None:
+    """Show nothing."""
+
+
+def small_plan(folder: Path, shards: int) -> Path:
+    """The shipped plan with few frames."""
+    text = find_plan("pressed-objects").read_text(encoding="utf-8")
+    lines = [
+        f"frames = {shards * FRAMES_A_SHARD}"
+        if line.startswith("frames = ")
+        else f"frames_a_shard = {FRAMES_A_SHARD}"
+        if line.startswith("frames_a_shard = ")
+        else line
+        for line in text.splitlines()
+    ]
+    path = folder / "plan.toml"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def measure_rendering(folder: Path, shards: int) -> Rates:
+    """The plan made by one and by two workers; it is left in the folder "data1"."""
+    plan, frames = small_plan(folder, shards), shards * FRAMES_A_SHARD
+    times = [
+        seconds(
+            lambda count=count: make_dataset(  # type: ignore[misc]
+                plan, folder / f"data{count}", ShardRange(), Scheduler(workers=count), no_watch
+            )
+        )
+        for count in (1, 2)
+    ]
+    if (folder / "data1/manifest.json").read_bytes() != (folder / "data2/manifest.json").read_bytes():
+        raise RuntimeError("one and two workers made different bytes")
+    return Rates("rendered", frames, frames / times[0], frames / times[1])
+
+
+def write_videos(folder: Path, shards: int) -> list[str]:
+    """The pictures of the data set as videos."""
+    images = [frame.image for frame in load(folder / "data1").frames(range(min(shards, 8)))]
+    paths = [folder / f"video{number}.mkv" for number in range(VIDEOS)]
+    for path in paths:
+        video = CodecVideo(path, Codec("ffv1", "bgr0", {"g": "1"}), 30.0)
+        for image in images * REPEATS:
+            video.add(image)
+        video.close()
+    return [str(path) for path in paths]
+
+
+def measure_extraction(folder: Path, shards: int) -> Rates:
+    videos, layout = write_videos(folder, shards), load_layout(folder / "data1/layouts/tac3d.json")
+    times, frames = [], 0
+    for count in (1, 2):
+        out = folder / f"markers{count}"
+        options = (Reading(), Scheduler(workers=count), no_watch, 4 * FRAMES_A_SHARD)
+        times.append(seconds(lambda: extract_markers(layout, videos, out, *options)))  # noqa: B023
+        frames = len(load(out))
+    return Rates("extracted", frames, frames / times[0], frames / times[1])
+
+
+def measure_sizes(folder: Path) -> Sizes:
+    frames = load(folder / "data1")
+    tables = sum(path.stat().st_size for path in (folder / "data1/tables").iterdir())
+    images = [(len(frame.image_bytes), len(to_png(frame.image))) for frame in frames.frames([0, 1])]
+    jpeg, png = (sum(sizes) / len(images) for sizes in zip(*images, strict=True))
+    return Sizes(jpeg, png, tables / len(frames))
+
+
+def do_nothing(number: int) -> int:
+    return number
+
+
+def measure_overhead(name: str, scheduler: Scheduler) -> Overhead:
+    start_s = seconds(lambda: list(results(do_nothing, [0], scheduler)))
+    many_s = seconds(lambda: list(results(do_nothing, range(EMPTY_SHARDS), scheduler)))
+    return Overhead(name, start_s, max(0.0, 1e3 * (many_s - start_s) / EMPTY_SHARDS))
+
+
+def measure_overheads() -> list[Overhead]:
+    """The pool of this machine, and a dask cluster of two workers on it, whose own start is not counted."""
+    from distributed import LocalCluster
+
+    found = [measure_overhead("local, 2 workers", Scheduler(workers=2))]
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        found.append(measure_overhead("dask, 2 workers", Scheduler(cluster.scheduler_address)))
+    return found
+
+
+def rates_table(rates: Sequence[Rates]) -> Table:
+    table = Table(title="Frames a second", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    table.add_column("frames", no_wrap=True)
+    for name in ("number", "one worker", "two workers", "efficiency"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for one in rates:
+        table.add_row(one.what, f"{one.frames}", f"{one.one:.1f}", f"{one.two:.1f}", f"{one.efficiency:.2f}")
+    return table
+
+
+def other_table(sizes: Sizes, overheads: Sequence[Overhead], rendered: Rates) -> Table:
+    table = Table(title="Size and overhead", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    table.add_column("figure", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_row("picture as JPEG 95, 4:4:4", f"{sizes.jpeg / 1e3:.0f} kB")
+    table.add_row("the same as PNG", f"{sizes.png / 1e3:.0f} kB")
+    table.add_row("row of the table", f"{sizes.table / 1e3:.1f} kB")
+    for one in overheads:
+        table.add_row(f"{one.scheduler}: start", f"{one.start_s:.1f} s")
+        table.add_row(f"{one.scheduler}: a shard without work", f"{one.ms_a_shard:.1f} ms")
+    hours = MILLIONS * 1e6 / rendered.one / 3600
+    size_gb = MILLIONS * 1e6 * (sizes.jpeg + sizes.table) / 1e9
+    table.add_row(f"{MILLIONS} million frames: hours of one core", f"{hours:.0f}")
+    table.add_row(f"{MILLIONS} million frames: JPEG and tables", f"{size_gb:.0f} GB")
+    table.add_row(f"computed at {CORE_HOUR_USD} USD a core hour", f"{hours * CORE_HOUR_USD:.0f} USD")
+    table.add_row(f"stored at {GB_MONTH_USD} USD a GB and month", f"{size_gb * GB_MONTH_USD:.0f} USD a month")
+    return table
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print the tables, write the JSON file if asked."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.dataset", description=(__doc__ or "").split("\n")[0]
+    )
+    parser.add_argument("--quick", action="store_true", help="few frames: a look, no figures to quote")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure, too")
+    options = parser.parse_args(arguments)
+    shards = QUICK_SHARDS if options.quick else SHARDS
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rates = [measure_rendering(folder, shards), measure_extraction(folder, shards)]
+        sizes = measure_sizes(folder)
+    overheads = measure_overheads()
+    console = Console()
+    console.print(rates_table(rates))
+    console.print(other_table(sizes, overheads, rates[0]))
+    console.print(conditions_text(), style="dim", soft_wrap=True)
+    if options.json:
+        figures = {
+            "rates": [asdict(one) | {"efficiency": one.efficiency} for one in rates],
+            "bytes": asdict(sizes),
+            "overheads": [asdict(one) for one in overheads],
+        }
+        write_json(options.json, figures)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,59 @@
+"""``cmpdesign dataset``: makes the frames of a plan, shard by shard."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cmpdesign.cli.commands.data.progress import print_made, shards_bar
+from cmpdesign.cli.options.scheduling import SchedulerOption, WorkersOption
+
+EXAMPLES = (
+    "cmpdesign dataset plan.toml -o pressed --workers 2",
+    "cmpdesign dataset plan.toml -o pressed --shards 1 --json",
+)
+
+
+def complete_plan(incomplete: str) -> list[str]:
+    """The names of plan templates that begin with a text, for the completion of shells."""
+    from cmpdesign.design.templates import plan_templates
+
+    return [name for name in plan_templates() if name.startswith(incomplete)]
+
+
+def dataset(
+    plan: Annotated[
+        str,
+        typer.Argument(
+            metavar="PLAN", help="A TOML file, or the name of a plan template.", autocompletion=complete_plan
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FOLDER", help="Data set: a new folder, or one of the same plan."
+        ),
+    ],
+    shards: Annotated[
+        str | None,
+        typer.Option(metavar="N|A:B", help="Only the first N shards, or those from A to below B."),
+    ] = None,
+    scheduler: SchedulerOption = "local",
+    workers: WorkersOption = None,
+) -> None:
+    """Make a data set: pictures, truth, markers, forces and parameters of the frames that a plan names.
+
+    A shard that is there is not made again: the same command goes on where a run ended. The same plan gives the same
+    bytes on any number of workers.
+    """
+    from cmpdesign.data.run import make_dataset, parse_shards
+    from cmpdesign.data.schedule.schedulers import parse_scheduler
+    from cmpdesign.design.templates import find_plan
+
+    wanted, where = parse_shards(shards), parse_scheduler(scheduler, workers)
+    with ExitStack() as stack:
+        made = make_dataset(find_plan(plan), output, wanted, where, shards_bar(stack))
+    print_made(output, made)

@@ -1,0 +1,239 @@
+"""The plan of a data set: a TOML file with designs, distributions and a number of frames; checked before any work."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from cmpdesign import __version__
+from cmpdesign.data.folder import FORMAT_FRAMES, Prepared, plan_digest
+from cmpdesign.data.frames.distributions import ABSENT, Source, check_distributions, distribution_kind, draw
+from cmpdesign.design.design import load_design
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.files.layout_json import layout_to_json, pattern_digest
+from cmpdesign.inputs.documents import read_toml
+from cmpdesign.inputs.files import MOST_DATA_BYTES, read_file
+from cmpdesign.inputs.names import Line, Name
+from cmpdesign.inputs.validation import validation_message
+from cmpdesign.layout.build import build_layout
+from cmpdesign.layout.layout import Layout
+from cmpdesign.reading.read_layout import read_layout
+from cmpdesign.scene.errors import SceneError
+from cmpdesign.scene.files.scene_file import scene_from_document
+
+MOST_FRAMES = 10**9
+MOST_FRAMES_A_SHARD = 100_000
+TRIALS = 32  # documents that are drawn and checked, without solving or drawing, before the work begins
+NOT_IN_SCENE = {
+    "seed": "every frame has a seed of its own",
+    "sequence": "every frame of a data set is one picture",
+}
+
+
+class PlanError(CmpDesignError, ValueError):
+    """A plan that cannot be carried out."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class ImageTable(_Table):
+    """[image]: how a frame's picture is encoded."""
+
+    kind: Literal["jpeg", "png"] = Field(
+        "jpeg", description="JPEG keeps the full resolution of color (4:4:4)."
+    )
+    quality: int = Field(95, ge=1, le=100, description="Of JPEG.")
+
+
+class MarkersTable(_Table):
+    """[markers]: whether and how the markers are read from the encoded picture."""
+
+    read: bool = True
+    preset: Literal["fast", "balanced", "accurate"] = "balanced"
+
+
+class PlanTable(_Table):
+    """A whole plan."""
+
+    name: Name = ""
+    description: Line = ""
+    frames: int = Field(ge=1, le=MOST_FRAMES)
+    frames_a_shard: int = Field(1000, ge=1, le=MOST_FRAMES_A_SHARD)
+    seed: int = Field(0, ge=0)
+    designs: list[str] = Field(min_length=1, max_length=1000)
+    weights: list[float] | None = None
+    image: ImageTable = Field(default_factory=lambda: ImageTable.model_validate({}))
+    markers: MarkersTable = Field(default_factory=lambda: MarkersTable.model_validate({}))
+    scene: dict[str, Any]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.frames % self.frames_a_shard:
+            more = -(-self.frames // self.frames_a_shard) * self.frames_a_shard
+            raise ValueError(
+                f"frames is {self.frames}; it must be a multiple of frames_a_shard, {self.frames_a_shard}, "
+                f"as in {more}, so that a data set can grow"
+            )
+        for name, reason in NOT_IN_SCENE.items():
+            if name in self.scene:
+                raise ValueError(f"scene.{name} has no place in a plan: {reason}; leave it out")
+        sensor = self.scene.get("sensor")
+        if isinstance(sensor, Mapping) and self.image.kind == "jpeg":
+            for key in {"jpeg_quality", "bits"} & sensor.keys():
+                if sensor[key] != 8:
+                    raise ValueError(
+                        f'scene.sensor.{key} has no place beside image.kind = "jpeg", which compresses 8 bits; '
+                        'leave it out, or take image.kind = "png"'
+                    )
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class NamedLayout:
+    """A design of a plan and its layout."""
+
+    name: str
+    layout: Layout
+
+
+def prepare_plan(path: str | Path) -> Prepared:
+    """Read and check a plan: designs, distributions, and scenes of some draws, without solving or drawing.
+
+    Raises:
+        CmpDesignError: a value that cannot be carried out; the message names the file and the key.
+    """
+    path = Path(path)
+    document = read_toml(path)
+    try:
+        table = PlanTable.model_validate(document)
+    except ValidationError as error:
+        raise PlanError(f"{path}: {validation_message(error, PlanTable)}") from None
+    try:
+        check_distributions(design_choice(table.designs, table.weights), "designs")
+        check_distributions(table.scene, "scene")
+    except CmpDesignError as error:
+        raise PlanError(f"{path}: {error}") from None
+    layouts = [_read_design(name, path.parent) for name in table.designs]
+    _require_different_names(layouts, path)
+    if table.markers.read:
+        _require_readable(layouts, path)
+    scene, inputs = _take_inputs(table.scene, path.parent)
+    _try_scenes(table.scene, [each.layout for each in layouts], path)
+    files = {f"layouts/{each.name}.json": layout_to_json(each.layout).encode() for each in layouts} | inputs
+    plan = _plan_document(table, scene, layouts, inputs)
+    return Prepared(plan | {"digest": plan_digest(plan)}, files)
+
+
+def design_choice(designs: Sequence[Any], weights: Sequence[float] | None) -> dict[str, Any]:
+    """The distribution of a frame's design: its place among the designs."""
+    choice: dict[str, Any] = {"choice": list(range(len(designs)))}
+    return choice if weights is None else choice | {"weights": list(weights)}
+
+
+def _plan_document(
+    table: PlanTable, scene: Mapping[str, Any], layouts: list[NamedLayout], inputs: Mapping[str, bytes]
+) -> dict[str, Any]:
+    """The object of plan.json, without its digest."""
+    return {
+        "format": FORMAT_FRAMES,
+        "version": 1,
+        "made_with": f"cmpdesign {__version__}",
+        "name": table.name,
+        "description": table.description,
+        "frames": table.frames,
+        "frames_a_shard": table.frames_a_shard,
+        "seed": table.seed,
+        "image": table.image.model_dump(),
+        "markers": table.markers.model_dump(),
+        "designs": [
+            {"name": each.name, "layout": f"layouts/{each.name}.json", "digest": pattern_digest(each.layout)}
+            for each in layouts
+        ],
+        "weights": table.weights,
+        "inputs": {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()},
+        "scene": scene,
+    }
+
+
+def _read_design(name: str, folder: Path) -> NamedLayout:
+    """A template, a design file, or a layout file; paths start at the plan's folder."""
+    path = folder / name
+    if path.suffix == ".json":
+        return NamedLayout(path.stem, read_layout(path))
+    has_file = bool(path.suffix) or len(Path(name).parts) > 1
+    return NamedLayout(path.stem, build_layout(load_design(path if has_file else name)))
+
+
+def _require_different_names(layouts: list[NamedLayout], path: Path) -> None:
+    names = [each.name for each in layouts]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise PlanError(f"{path}: designs has two of the name {twice}; rename the file of one")
+
+
+def _require_readable(layouts: list[NamedLayout], path: Path) -> None:
+    for each in layouts:
+        if each.layout.cell_corners.shape[1] != 3:
+            raise PlanError(
+                f"{path}: the design {each.name} has no triangles and cannot be read; leave it out, or set "
+                "markers.read = false"
+            )
+
+
+def _take_inputs(scene: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """The scene with the paths of its height maps and pictures as they are in the data set, and these files."""
+    taken: dict[str, bytes] = {}
+    changed = copy.deepcopy(dict(scene))
+    for table in _tables_with_path(changed):
+        content = read_file(folder / table["path"], MOST_DATA_BYTES)
+        name = f"inputs/{hashlib.sha256(content).hexdigest()[:16]}{Path(table['path']).suffix}"
+        taken[name] = content
+        table["path"] = name
+    return changed, taken
+
+
+def _tables_with_path(value: Any) -> Iterator[dict[str, Any]]:
+    if isinstance(value, dict):
+        if isinstance(value.get("path"), str):
+            yield value
+        for inner in value.values():
+            yield from _tables_with_path(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _tables_with_path(inner)
+
+
+class _Ends:
+    """Draws one end of every range."""
+
+    def __init__(self, value: float) -> None:
+        self._value = value
+
+    def random(self) -> float:
+        return self._value
+
+    def standard_normal(self) -> float:
+        return 6 * self._value - 3
+
+
+def _try_scenes(scene: Mapping[str, Any], layouts: list[Layout], path: Path) -> None:
+    """Check the scenes at both ends of all ranges, and of some draws."""
+    rng = np.random.default_rng(0)
+    sources: list[Source] = [_Ends(0.0), _Ends(1.0 - 2**-53), *[rng] * TRIALS]
+    for number, source in enumerate(sources):
+        drawn = draw(scene, source)
+        if drawn is ABSENT or distribution_kind(drawn):
+            raise PlanError(f"{path}: scene is no table")
+        try:
+            scene_from_document(drawn, path, layouts[number % len(layouts)])
+        except SceneError as error:
+            raise PlanError(f"{error} (in a scene that the plan can draw)") from None

@@ -1,0 +1,130 @@
+"""Data sets made from end to end: prepared, worked on shard by shard, sealed with a manifest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cmpdesign.data.folder import (
+    Prepared,
+    Progress,
+    clear_unfinished,
+    find_record,
+    open_folder,
+    write_manifest,
+)
+from cmpdesign.data.frames.plan import prepare_plan
+from cmpdesign.data.schedule.schedulers import Scheduler, results
+from cmpdesign.data.shard import make_shard
+from cmpdesign.data.videos.extraction import Reading, index_source, name_tasks, prepare_extraction
+from cmpdesign.errors import CmpDesignError
+from extractor import Reference
+
+# Called with (shards that are done, shards that are wanted) at the start and after every shard.
+Watch = Callable[[int, int], None]
+FRAMES_A_SHARD = 1000  # of an extraction
+
+
+@dataclass(frozen=True)
+class ShardRange:
+    """Shards from ``first`` up to, and without, ``end``; None: up to the plan's last."""
+
+    first: int = 0
+    end: int | None = None
+
+
+def parse_shards(text: str | int | None) -> ShardRange:
+    """The shards from "N", the first N, or "A:B", those from A to below B; None for all.
+
+    Raises:
+        CmpDesignError: another text.
+    """
+    if text is None:
+        return ShardRange()
+    first, colon, end = str(text).partition(":")
+    parts = (first, end) if colon else ("0", first)
+    if not all(part.isdecimal() and len(part) < 10 for part in parts) or int(parts[0]) >= int(parts[1]):
+        raise CmpDesignError(
+            f"shards is {text}; it must be a number above 0, as in 8, or a range A:B with A below B, as in 8:16"
+        )
+    return ShardRange(int(parts[0]), int(parts[1]))
+
+
+def make_dataset(
+    plan: str | Path, folder: str | Path, shards: ShardRange, scheduler: Scheduler, watch: Watch
+) -> Progress:
+    """Make the shards of a plan that are not done yet.
+
+    Args:
+        plan: the TOML file.
+        folder: the data set: a new folder, or that of an interrupted run of the same plan.
+        shards: which shards.
+        scheduler: where they are made.
+        watch: see ``Watch``.
+
+    Raises:
+        CmpDesignError: the plan cannot be carried out, or the folder holds something else; workers were lost.
+        OutputError: a file cannot be written. Finished shards are kept, and in no case is a shard half-written.
+    """
+    return _carry_out(prepare_plan(plan), Path(folder).resolve(), shards, scheduler, watch)
+
+
+def extract_markers(
+    layout: Reference,
+    sources: Sequence[str],
+    folder: str | Path,
+    reading: Reading,
+    scheduler: Scheduler,
+    watch: Watch,
+    frames_a_shard: int = FRAMES_A_SHARD,
+) -> Progress:
+    """Read the markers of all frames of videos and folders of pictures, part by part.
+
+    Args:
+        layout: the pattern.
+        sources: see ``name_tasks``.
+        folder: see ``make_dataset``.
+        reading: how frames are read.
+        scheduler: where parts are read.
+        watch: see ``Watch``.
+        frames_a_shard: smallest number of frames of a part, but for the last of a source.
+
+    Raises:
+        CmpDesignError, OutputError: see ``make_dataset``; or a source cannot be read.
+    """
+    if frames_a_shard < 1:
+        raise CmpDesignError(f"frames_a_shard is {frames_a_shard}; it must be 1 or more")
+    tasks = name_tasks(sources, frames_a_shard)
+    found: dict[str, dict[str, Any]] = {one["name"]: one for one in results(index_source, tasks, scheduler)}
+    prepared = prepare_extraction(layout, [found[task.name] for task in tasks], reading)
+    return _carry_out(prepared, Path(folder).resolve(), ShardRange(), scheduler, watch)
+
+
+def _carry_out(
+    prepared: Prepared, folder: Path, shards: ShardRange, scheduler: Scheduler, watch: Watch
+) -> Progress:
+    import pyarrow.parquet  # noqa: F401  # tell here, not in a worker, that it is missing
+
+    end = prepared.shards if shards.end is None else shards.end
+    if end > prepared.shards:
+        raise CmpDesignError(
+            f"shards is {shards.first}:{end}; the plan has {prepared.shards} shards; give fewer"
+        )
+    open_folder(folder, prepared)
+    wanted = range(shards.first, end)
+    digest = prepared.document["digest"]
+    missing = [number for number in wanted if find_record(folder, digest, number) is None]
+    done = len(wanted) - len(missing)
+    watch(done, len(wanted))
+    try:
+        with closing(results(partial(make_shard, str(folder)), missing, scheduler)) as made:
+            for _ in made:
+                done += 1
+                watch(done, len(wanted))
+    finally:
+        clear_unfinished(folder, missing)
+    return write_manifest(folder)

@@ -1,0 +1,59 @@
+"""Processes that work for this one, and end when this one ends, however it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Thread
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+
+
+@contextmanager
+def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """A pool of processes, each with an interpreter of its own.
+
+    The processes ignore Ctrl-C, which reaches all processes of a terminal: this process decides. They end
+
+    - with the block, after the work that was submitted;
+    - at once when an exception leaves the block: work that was begun is lost;
+    - at once when this process is gone, as after ``kill -9``.
+
+    Args:
+        workers: number of processes, 1 or more.
+
+    Yields:
+        The pool; what is submitted to it must be picklable.
+    """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import active_children, get_context
+
+    others = set(active_children())
+    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_begin) as pool:
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in set(active_children()) - others:
+                process.kill()
+            raise
+
+
+def _begin() -> None:
+    """Begin a worker: ignore Ctrl-C, and watch the process that started it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, name="end with parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Wait until the process that started this one is gone, and end this one."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,37 @@
+"""Read one picture: which markers are where, how well, and what to do where it fails.
+
+    python examples/read_one_picture.py [layout.json picture.png]
+
+Without arguments a picture is drawn first.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import cv2
+
+import cmpdesign
+from extractor import Extractor
+
+
+def main(layout: str = "", picture: str = "") -> None:
+    if not picture:
+        design = cmpdesign.load("tac3d")
+        design.layout.write(layout := "layout.json")
+        cmpdesign.render(design.layout, pitch_px=22, rotation_deg=12, noise=2).save(picture := "seen.png")
+    image = cv2.imread(picture)
+    if image is None:
+        sys.exit(f"{picture}: is no picture that OpenCV reads")
+    markers = Extractor(layout).extract(image)
+    if markers.reason is not None:
+        sys.exit(f"{picture}: not read: {markers.reason}")
+    found = markers.status > 0
+    print(f"{found.sum()} of {len(found)} markers, {(markers.status == 1).sum()} of them measured")
+    for marker in range(0, len(found), 60):
+        (x, y), error_px = markers.xy_px[marker], markers.cov_px2[marker].trace() ** 0.5
+        print(f"marker {marker:3d} at ({x:7.2f}, {y:7.2f}) px, error {error_px:.3f} px")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:3])

@@ -1,0 +1,85 @@
+"""The examples that need nothing from outside, and the notebooks: all run in a folder of their own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+# What an example prints, in part, and files that it leaves.
+RUN = {
+    "read_one_picture": ("331 of 331 markers, 331 of them measured", ["layout.json", "seen.png"]),
+    "follow_a_video": ("0.133 s: marker", ["layout.json", "frames/4.png"]),
+    "my_own_pattern": ("127 of 127 markers, error 0.0", ["swirl/pattern.svg"]),
+    "compare_designs": ("honeycomb       9      271     1.205", []),
+    "size_for_my_camera": ("honeycomb, 19 layers", ["sized/layout.json"]),
+    "make_a_laser_job": ("1-red.gcode", ["pad/laser/job.lbrn2", "pad/as-made/laser.json"]),
+    "plot_a_recording": ("6 frames: history.png", ["history.png", "displacement.png", "run.npz"]),
+}
+OTHERS = {"lerobot_camera", "ros2_node", "sensor_housing"}  # tested beside this file, and with the molds
+NOTEBOOKS = ("explore_a_design", "plot_a_recording", "compare_designs")
+MOST_LINES = 45
+
+
+def run_python(words: Sequence[str | Path], folder: Path) -> str:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg", "PYTHONWARNINGS": "error"}
+    result = subprocess.run(
+        [sys.executable, *words], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+def test_every_example_is_run_and_short() -> None:
+    files = {path.stem: len(path.read_text(encoding="utf-8").splitlines()) for path in EXAMPLES.glob("*.py")}
+    assert files.keys() == RUN.keys() | OTHERS and len(files) == 10
+    assert {path.stem for path in EXAMPLES.glob("*.ipynb")} == set(NOTEBOOKS)
+    assert {name: lines for name, lines in files.items() if lines > MOST_LINES and name in RUN} == {}
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_an_example_runs(name: str, tmp_path: Path) -> None:
+    said, files = RUN[name]
+    assert said in run_python([EXAMPLES / f"{name}.py"], tmp_path)
+    assert [file for file in files if not (tmp_path / file).stat().st_size] == []
+
+
+def test_an_example_takes_files(tmp_path: Path) -> None:
+    run_python([EXAMPLES / "read_one_picture.py"], tmp_path)
+    (tmp_path / "other").mkdir()
+    printed = run_python(
+        [EXAMPLES / "read_one_picture.py", "../layout.json", "../seen.png"], tmp_path / "other"
+    )
+    assert "331 of 331" in printed and list((tmp_path / "other").iterdir()) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_a_notebook_runs(name: str, tmp_path: Path) -> None:
+    run = (
+        "import sys, nbformat\nfrom nbclient import NotebookClient\n"
+        "book = nbformat.read(sys.argv[1], 4)\n"
+        "assert not any(cell.get('outputs') for cell in book.cells), 'notebooks are kept without results'\n"
+        "NotebookClient(book, timeout=600, kernel_name='python3').execute()\n"
+        "print(sum(bool(cell.get('outputs')) for cell in book.cells))"
+    )
+    program = tmp_path / "run.py"
+    program.write_text(run, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    words = [sys.executable, program, EXAMPLES / f"{name}.ipynb"]
+    result = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert int(result.stdout.splitlines()[-1]) >= 3
+
+
+@pytest.mark.slow
+def test_the_examples_are_typed(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "mypy", "--strict", f"--cache-dir={tmp_path}", EXAMPLES]
+    result = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout
