@@ -25,7 +25,13 @@ def connected(port: int) -> ClientConnection:
         with suppress(ConnectionRefusedError):
             url = f"ws://127.0.0.1:{port}"
             return connect(
-                url, subprotocols=[PROTOCOL], max_size=None, max_queue=4, close_timeout=1, legacy=True
+                url,
+                subprotocols=[PROTOCOL],
+                max_size=None,
+                max_queue=4,
+                close_timeout=1,
+                ping_interval=None,
+                legacy=True,
             )
         time.sleep(0.05)
     raise SystemExit("there is no server")
