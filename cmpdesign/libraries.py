@@ -32,7 +32,13 @@ EXTRAS = {
     "dask": "data sets made by several machines",
 }
 # Distributions of another name than their module.
-_DISTRIBUTIONS = {"OCP": "cadquery-ocp-novtk", "cv2": "opencv-contrib-python-headless", "PIL": "pillow"}
+_DISTRIBUTIONS = {
+    "OCP": "cadquery-ocp-novtk",
+    "PIL": "pillow",
+    "cv2": "opencv-contrib-python-headless",
+    "foxglove": "foxglove-sdk",
+    "rerun": "rerun-sdk",
+}
 _OWN = ("cmpdesign", "extractor")
 
 
