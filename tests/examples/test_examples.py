@@ -22,7 +22,12 @@ RUN = {
     "make_a_laser_job": ("1-red.gcode", ["pad/laser/job.lbrn2", "pad/as-made/laser.json"]),
     "plot_a_recording": ("6 frames: history.png", ["history.png", "displacement.png", "run.npz"]),
 }
-OTHERS = {"lerobot_camera", "ros2_node", "sensor_housing", "torch_frames"}  # tested beside this file, and with the molds
+OTHERS = {
+    "lerobot_camera",
+    "ros2_node",
+    "sensor_housing",
+    "torch_frames",
+}  # tested beside this file, and with the molds
 NOTEBOOKS = ("explore_a_design", "plot_a_recording", "compare_designs")
 MOST_LINES = 45
 
