@@ -22,8 +22,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # markup would swallow what stands in brackets in a help text
     help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.\n\n"
-    "Exit codes: 0 done, and what was judged is good; 1 done, and what was judged is not good; 2 bad input, or a file "
-    "that cannot be written; 130 stopped by Ctrl-C.",
+    "Exit codes: 0 done; 1 done, with a negative verdict or an early end; 2 bad input, or a file that cannot be "
+    "written; 130 stopped by Ctrl-C.",
     epilog=examples("cmpdesign build tac3d -o mine", "cmpdesign verify --help"),
 )
 for module, function in (

@@ -132,6 +132,7 @@ def finish(make_document: Callable[[], Document], exit_code: int = 0) -> None:
     """
     if current_mode().as_json:
         print_document(make_document().to_json())
+    print_step("done")
     if exit_code:
         raise typer.Exit(exit_code)
 

@@ -156,7 +156,8 @@ def _joined(records: Records, fields: tuple[str, ...]) -> NDArray[np.float32]:
 
 def _fixed_lists(values: NDArray[Any]) -> Any:
     """(N, K) as N lists of K numbers."""
-    import pyarrow
+    with extra("rerun"):
+        import pyarrow
 
     return pyarrow.FixedSizeListArray.from_arrays(
         pyarrow.array(np.ascontiguousarray(values).ravel()), values.shape[1]

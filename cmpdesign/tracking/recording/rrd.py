@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from cmpdesign.files.atomic import staged_file
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.columns import Columns
 from cmpdesign.tracking.recording.frames import FrameReader, RecordedFrame
 from cmpdesign.tracking.recording.images import kept_image
-from cmpdesign.tracking.recording.rerun_rows import APPLICATION, RerunRows, require_rerun
+from cmpdesign.tracking.recording.rerun_rows import APPLICATION, RerunRows
 
 IMAGES_AT_ONCE = 16  # frames that are in memory together with their images
 
@@ -42,8 +43,8 @@ def write_rrd(chunks: Iterable[Columns], about: Columns, path: Path, images: Pat
 
 
 def _write_file(path: Path, frames: Iterable[RecordedFrame], frame_id: str) -> None:
-    require_rerun()
-    from rerun.chunk import LazyChunkStream
+    with extra("rerun", "write .mcap"):
+        from rerun.chunk import LazyChunkStream
 
     groups = iter(_in_groups(frames))
     first = next(groups)
@@ -55,7 +56,8 @@ def _write_file(path: Path, frames: Iterable[RecordedFrame], frame_id: str) -> N
 
 
 def _chunks(groups: Iterable[Sequence[RecordedFrame]], frame_id: str) -> Iterator[Any]:
-    from rerun.chunk import Chunk
+    with extra("rerun"):
+        from rerun.chunk import Chunk
 
     rows = RerunRows(frame_id)
     for frames in groups:

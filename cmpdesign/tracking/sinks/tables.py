@@ -117,6 +117,8 @@ def _recover_chunks(part: Path, path: Path) -> Recovered:
 
 
 def _require_kind(path: Path) -> None:
+    if not path.name:
+        raise CmpDesignError(f"{path}: is a folder; give a file's name, or that of a new folder")
     if path.suffix not in (*KINDS, ""):
         raise CmpDesignError(
             f"{path}: unknown ending; expected one of {', '.join(KINDS)}, or none for a rosbag2 folder"
