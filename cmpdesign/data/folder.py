@@ -257,12 +257,23 @@ def finished_records(folder: Path) -> list[Record]:
         CmpDesignError: the folder holds no plan.
     """
     plan = read_plan(folder)
-    if path_exists(folder / MANIFEST):
+    listed = _listed_records(folder, plan["digest"])
+    numbers = [record["shard"] for record in listed]
+    return listed if numbers == list(range(number_of_shards(plan))) else list(_find_records(folder, plan))
+
+
+def _listed_records(folder: Path, digest: str) -> list[Record]:
+    """The records in the manifest; none where it cannot be read, or is of another plan."""
+    try:
         manifest = read_json(folder / MANIFEST)
-        is_of_plan = isinstance(manifest, dict) and manifest.get("plan") == plan["digest"]
-        if is_of_plan and len(manifest.get("shards", ())) == number_of_shards(plan):
-            return list(manifest["shards"])
-    return list(_find_records(folder, plan))
+        if manifest["plan"] != digest:
+            return []
+        return [
+            {**record, "shard": int(record["shard"]), "frames": int(record["frames"])}
+            for record in manifest["shards"]
+        ]
+    except (InputError, KeyError, TypeError, ValueError):
+        return []
 
 
 def write_manifest(folder: Path) -> Progress:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -78,10 +79,15 @@ def remove_abandoned_stages(parent: Path) -> None:
         if descriptor is None:
             continue
         try:
-            if try_lock(descriptor) is Lock.HELD and os.fstat(descriptor).st_uid == os.geteuid():
+            if try_lock(descriptor) is Lock.HELD and _is_own(descriptor):
                 shutil.rmtree(path, ignore_errors=True)
         finally:
             os.close(descriptor)
+
+
+def _is_own(descriptor: int) -> bool:
+    """True if an open file or folder belongs to the user; on Windows, which does not say so, always."""
+    return sys.platform == "win32" or os.fstat(descriptor).st_uid == os.geteuid()
 
 
 def _stages_in(parent: Path) -> list[Path]:

@@ -200,7 +200,7 @@ class Refiner:
         if estimate.sigma < schedule.sharp_blur_share * edge_px:
             return self._final_profiles(view, with_roughness(topology, start), contrasts, places)
         usual_px = median_edge(start.xy, topology.edges)
-        estimate = self._synthesis_solver.steps(view, start, schedule.steps, usual_px)
+        estimate = self._synthesis_solver.steps(view, start, schedule, usual_px)
         return self._accept_or_recover(view, estimate, contrasts, places)
 
     def _final_profiles(

@@ -61,16 +61,16 @@ REFINEMENT = (
         "the last of a preset's steps by synthesis, where markers still move",
         "accuracy",
         "extractor/refine/refiner.py",
-        "self._synthesis_solver.steps(view, start, schedule.steps, usual_px)",
-        "self._synthesis_solver.steps(view, start, schedule.steps - 1, usual_px)",
+        "self._synthesis_solver.steps(view, start, schedule, usual_px)",
+        "self._synthesis_solver.steps(view, start, schedule._replace(steps=schedule.steps - 1), usual_px)",
     ),
     Rule(
         "small move",
         "no step follows one that hardly moved the markers",
         "accuracy",
         "extractor/refine/synthesis_steps.py",
-        "small_move: float = 0.25",
-        "small_move: float = 0.0",
+        "typical_move(shift, estimate.information) < schedule.small_move",
+        "typical_move(shift, estimate.information) < 0.0",
     ),
 )
 

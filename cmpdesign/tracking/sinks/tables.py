@@ -126,7 +126,7 @@ def _require_kind(path: Path) -> None:
     if path.suffix == ".parquet":
         require_pyarrow()
     if path.suffix == ".rrd":
-        from cmpdesign.tracking.recording.rerun_log import require_rerun
+        from cmpdesign.tracking.recording.rerun_rows import require_rerun
 
         require_rerun()
     elif is_recording(path):

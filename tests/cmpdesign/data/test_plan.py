@@ -8,7 +8,7 @@ import pytest
 
 from cmpdesign.data.frames.plan import prepare_plan
 from tests.support.command import refused
-from tests.support.datasets import DESIGN, write_plan
+from tests.support.made.datasets import DESIGN, write_plan
 
 SQUARE = 'pattern = "square"\nlayers = 3\npitch_mm = 2.0\n'
 

@@ -1,6 +1,6 @@
 """How fast data sets are made and read, on one and on two workers, and how large they are.
 
-    python -m benchmarks.dataset [--quick] [--json FILE]
+    python -m benchmarks.datasets [--quick] [--json FILE] [--publish]
 
 "rendered": the shipped plan pressed-objects: every frame is drawn, its contact solved, rendered, encoded as JPEG and
 read. "extracted": the same pictures as videos (FFV1, 640 x 480 px), decoded and read. Frames a second are those of the
@@ -15,25 +15,28 @@ import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.support.machine import conditions_text, machine_conditions, write_json
+from benchmarks.support.published import write_published
 from cmpdesign.data import load
 from cmpdesign.data.run import ShardRange, extract_markers, make_dataset
-from cmpdesign.data.schedule.schedulers import Scheduler, results
+from cmpdesign.data.schedule.schedulers import Scheduler
+from cmpdesign.data.schedule.schedulers import results as results_of
 from cmpdesign.data.videos.extraction import Reading
 from cmpdesign.design.templates import find_plan
 from cmpdesign.files.images import to_png
 from cmpdesign.tracking.export.video import Codec, CodecVideo
 from extractor import load_layout
 
-FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 32, 2
+FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 16, 2
 VIDEOS, REPEATS = 2, 4  # every picture is in the videos several times
 EMPTY_SHARDS = 200
 MILLIONS = 10
@@ -78,10 +81,6 @@ def seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - started
 
 
-def no_watch(done: int, wanted: int) -> None:
-    """Show nothing."""
-
-
 def small_plan(folder: Path, shards: int) -> Path:
     """The shipped plan with few frames."""
     text = find_plan("pressed-objects").read_text(encoding="utf-8")
@@ -104,7 +103,7 @@ def measure_rendering(folder: Path, shards: int) -> Rates:
     times = [
         seconds(
             lambda count=count: make_dataset(  # type: ignore[misc]
-                plan, folder / f"data{count}", ShardRange(), Scheduler(workers=count), no_watch
+                plan, folder / f"data{count}", ShardRange(), Scheduler(workers=count)
             )
         )
         for count in (1, 2)
@@ -131,7 +130,7 @@ def measure_extraction(folder: Path, shards: int) -> Rates:
     times, frames = [], 0
     for count in (1, 2):
         out = folder / f"markers{count}"
-        options = (Reading(), Scheduler(workers=count), no_watch, 4 * FRAMES_A_SHARD)
+        options = (Reading(), Scheduler(workers=count), 4 * FRAMES_A_SHARD)
         times.append(seconds(lambda: extract_markers(layout, videos, out, *options)))  # noqa: B023
         frames = len(load(out))
     return Rates("extracted", frames, frames / times[0], frames / times[1])
@@ -150,8 +149,8 @@ def do_nothing(number: int) -> int:
 
 
 def measure_overhead(name: str, scheduler: Scheduler) -> Overhead:
-    start_s = seconds(lambda: list(results(do_nothing, [0], scheduler)))
-    many_s = seconds(lambda: list(results(do_nothing, range(EMPTY_SHARDS), scheduler)))
+    start_s = seconds(lambda: list(results_of(do_nothing, [0], scheduler)))
+    many_s = seconds(lambda: list(results_of(do_nothing, range(EMPTY_SHARDS), scheduler)))
     return Overhead(name, start_s, max(0.0, 1e3 * (many_s - start_s) / EMPTY_SHARDS))
 
 
@@ -175,50 +174,100 @@ def rates_table(rates: Sequence[Rates]) -> Table:
     return table
 
 
-def other_table(sizes: Sizes, overheads: Sequence[Overhead], rendered: Rates) -> Table:
+def other_table(results: Mapping[str, Any]) -> Table:
     table = Table(title="Size and overhead", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
     table.add_column("figure", no_wrap=True)
     table.add_column("value", justify="right", no_wrap=True)
-    table.add_row("picture as JPEG 95, 4:4:4", f"{sizes.jpeg / 1e3:.0f} kB")
-    table.add_row("the same as PNG", f"{sizes.png / 1e3:.0f} kB")
-    table.add_row("row of the table", f"{sizes.table / 1e3:.1f} kB")
-    for one in overheads:
-        table.add_row(f"{one.scheduler}: start", f"{one.start_s:.1f} s")
-        table.add_row(f"{one.scheduler}: a shard without work", f"{one.ms_a_shard:.1f} ms")
-    hours = MILLIONS * 1e6 / rendered.one / 3600
-    size_gb = MILLIONS * 1e6 * (sizes.jpeg + sizes.table) / 1e9
-    table.add_row(f"{MILLIONS} million frames: hours of one core", f"{hours:.0f}")
-    table.add_row(f"{MILLIONS} million frames: JPEG and tables", f"{size_gb:.0f} GB")
-    table.add_row(f"computed at {CORE_HOUR_USD} USD a core hour", f"{hours * CORE_HOUR_USD:.0f} USD")
-    table.add_row(f"stored at {GB_MONTH_USD} USD a GB and month", f"{size_gb * GB_MONTH_USD:.0f} USD a month")
+    sizes, paper = results["bytes"], sum_on_paper(results)
+    table.add_row("picture as JPEG 95, 4:4:4", f"{sizes['jpeg'] / 1e3:.0f} kB")
+    table.add_row("the same as PNG", f"{sizes['png'] / 1e3:.0f} kB")
+    table.add_row("row of the table", f"{sizes['table'] / 1e3:.1f} kB")
+    for row in results["overheads"]:
+        table.add_row(f"{row['scheduler']}: start", f"{row['start_s']:.1f} s")
+        table.add_row(f"{row['scheduler']}: a shard without work", f"{row['ms_a_shard']:.1f} ms")
+    table.add_row(f"{MILLIONS} million frames: hours of one core", f"{paper['hours']:.0f}")
+    table.add_row(f"{MILLIONS} million frames: JPEG and tables", f"{paper['size_gb']:.0f} GB")
+    table.add_row(f"computed at {CORE_HOUR_USD} USD a core hour", f"{paper['compute_usd']:.0f} USD")
+    table.add_row(f"kept at {GB_MONTH_USD} USD a GB and month", f"{paper['store_usd_month']:.0f} USD a month")
     return table
+
+
+def sum_on_paper(results: Mapping[str, Any]) -> dict[str, float]:
+    """Core hours, GB and USD of 10 million frames."""
+    hours = MILLIONS * 1e6 / results["rates"][0]["one"] / 3600
+    size_gb = MILLIONS * 1e6 * (results["bytes"]["jpeg"] + results["bytes"]["table"]) / 1e9
+    return {
+        "hours": hours,
+        "size_gb": size_gb,
+        "compute_usd": hours * CORE_HOUR_USD,
+        "store_usd_month": size_gb * GB_MONTH_USD,
+    }
+
+
+def markdown(results: Mapping[str, Any]) -> dict[str, str]:
+    """The blocks of the page docs/how-to/datasets.md."""
+    lines = ["| frames a second | one worker | two workers | efficiency |", "|---|---|---|---|"]
+    lines += [
+        f"| {row['what']} | {row['one']:.1f} | {row['two']:.1f} | {row['efficiency']:.2f} |"
+        for row in results["rates"]
+    ]
+    sizes = {name: f"{value / 1e3:.0f} kB" for name, value in results["bytes"].items()}
+    lines += ["", "| a frame | bytes |", "|---|---|"]
+    lines += [
+        f"| picture, JPEG of quality 95, 4:4:4 | {sizes['jpeg']} |",
+        f"| the same as PNG | {sizes['png']} |",
+        f"| row of the table: truth, markers, covariances, parameters | {sizes['table']} |",
+    ]
+    lines += ["", "| scheduler | start | a shard without work |", "|---|---|---|"]
+    lines += [
+        f"| {row['scheduler']} | {row['start_s']:.1f} s | {row['ms_a_shard']:.0f} ms |"
+        for row in results["overheads"]
+    ]
+    paper = sum_on_paper(results)
+    on_cores = ", ".join(f"{paper['hours'] / count:,.0f} on {count:,}" for count in (64, 1000))
+    sums = [
+        f"| {MILLIONS} million frames | |",
+        "|---|---|",
+        f"| core hours | {paper['hours']:,.0f}; so many hours on cores: {on_cores} |",
+        f"| JPEG and tables | {paper['size_gb'] / 1e3:.2f} TB |",
+        f"| computed, at {CORE_HOUR_USD} USD a core hour | {paper['compute_usd']:,.0f} USD |",
+        f"| kept, at {GB_MONTH_USD} USD a GB and month | {paper['store_usd_month']:,.0f} USD a month |",
+    ]
+    caption = f"Measured: {conditions_text(results['conditions'])}"
+    return {"datasets": "\n".join([*lines, "", caption]), "datasets-sum": "\n".join(sums)}
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print the tables, write the JSON file if asked."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.dataset", description=(__doc__ or "").split("\n")[0]
+        prog="python -m benchmarks.datasets", description=(__doc__ or "").split("\n")[0]
     )
     parser.add_argument("--quick", action="store_true", help="few frames: a look, no figures to quote")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure, too")
+    parser.add_argument(
+        "--publish", action="store_true", help="write docs/measured and the page that shows it"
+    )
     options = parser.parse_args(arguments)
     shards = QUICK_SHARDS if options.quick else SHARDS
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         rates = [measure_rendering(folder, shards), measure_extraction(folder, shards)]
         sizes = measure_sizes(folder)
-    overheads = measure_overheads()
+    results = {
+        "conditions": machine_conditions(),
+        "rates": [asdict(one) | {"efficiency": one.efficiency} for one in rates],
+        "bytes": asdict(sizes),
+        "overheads": [asdict(one) for one in measure_overheads()],
+    }
     console = Console()
     console.print(rates_table(rates))
-    console.print(other_table(sizes, overheads, rates[0]))
+    console.print(other_table(results))
     console.print(conditions_text(), style="dim", soft_wrap=True)
     if options.json:
-        figures = {
-            "rates": [asdict(one) | {"efficiency": one.efficiency} for one in rates],
-            "bytes": asdict(sizes),
-            "overheads": [asdict(one) for one in overheads],
-        }
-        write_json(options.json, figures)
+        write_json(options.json, results)
+    if options.publish:
+        for path in write_published("datasets", results, markdown(results)):
+            console.print(f"wrote {path}")
     return 0
 
 
