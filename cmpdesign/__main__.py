@@ -4,4 +4,5 @@ from __future__ import annotations
 
 from cmpdesign.cli import main
 
-main()
+if __name__ == "__main__":  # processes of multiprocessing import this file, too
+    main()

@@ -32,7 +32,13 @@ EXTRAS = {
     "dask": "data sets made by several machines",
 }
 # Distributions of another name than their module.
-_DISTRIBUTIONS = {"OCP": "cadquery-ocp-novtk", "cv2": "opencv-contrib-python-headless", "PIL": "pillow"}
+_DISTRIBUTIONS = {
+    "OCP": "cadquery-ocp-novtk",
+    "PIL": "pillow",
+    "cv2": "opencv-contrib-python-headless",
+    "foxglove": "foxglove-sdk",
+    "rerun": "rerun-sdk",
+}
 _OWN = ("cmpdesign", "extractor")
 
 
@@ -84,7 +90,9 @@ def require_libraries(name: str, *modules: str, instead: str = "") -> None:
 def install_command(name: str) -> str:
     """The command that installs an extra, from where this package itself was installed."""
     source, options = _installed_from()
-    return f"pip install {options}{shlex.quote(f'{source}[{name}]')}"
+    wanted = f"{source}[{name}]"
+    quoted = f'"{wanted}"' if sys.platform == "win32" else shlex.quote(wanted)
+    return f"pip install {options}{quoted}"
 
 
 def missing_library_text(error: ModuleNotFoundError) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Thread
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
+
+MOST_ON_WINDOWS = 61
 
 
 @contextmanager
@@ -33,14 +36,22 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     from multiprocessing import active_children, get_context
 
     others = set(active_children())
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_begin) as pool:
+    with ProcessPoolExecutor(possible_workers(workers), get_context("spawn"), initializer=_begin) as pool:
         try:
             yield pool
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
-            for process in set(active_children()) - others:
+            mine = set(active_children()) - others
+            for process in mine:
                 process.kill()
+            for process in mine:  # until it is gone, a process holds the locks of its files
+                process.join()
             raise
+
+
+def possible_workers(workers: int) -> int:
+    """The number of processes, or the most that Python can wait for on Windows."""
+    return min(workers, MOST_ON_WINDOWS) if sys.platform == "win32" else workers
 
 
 def _begin() -> None:

@@ -136,7 +136,7 @@ class Markers(FrozenRecord):
         if self.reason is not None:
             rows["reason"] = self.reason.text
         if self.quality is not None and self.quality.hints:
-            rows["what to do"] = "; ".join(self.quality.hints)
+            rows["remedy"] = "; ".join(self.quality.hints)
         cells = "".join(f"<tr><th>{name}</th><td>{escape(text)}</td></tr>" for name, text in rows.items())
         return f"<table>{cells}</table>"
 

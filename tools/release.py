@@ -16,13 +16,15 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 OLDEST, NEWEST = 11, 14  # minor versions of Python 3 that are looked for
-TEST_NEEDS = ("pytest>=8,<10", "hypothesis>=6.100,<7")
+# Of the extra [dev]: what runs the pages, and the other program that opens a recording in a tutorial.
+TEST_NEEDS = ("pytest", "hypothesis", "mcap-ros2-support")
 # What the pages' tests need of the sources. Not the packages: these come from the wheel.
 TESTED = (
     "tests",
@@ -69,6 +71,13 @@ def uncommitted(root: Path) -> list[str]:
         ["git", "status", "--porcelain"], cwd=root, capture_output=True, text=True, check=True
     )
     return [f"uncommitted: {line[3:]}" for line in done.stdout.splitlines()]
+
+
+def page_needs(root: Path) -> list[str]:
+    """The requirements of ``TEST_NEEDS`` with the versions that pyproject.toml allows."""
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    named = {re.split(r"[^\w.-]", line)[0]: line for line in project["optional-dependencies"]["dev"]}
+    return [named[name] for name in TEST_NEEDS]
 
 
 def found_pythons() -> list[str]:
@@ -129,11 +138,17 @@ def try_python(python: str) -> bool:
     """Whether the wheel of a Python installs into an empty environment and runs the pages."""
     with tempfile.TemporaryDirectory(prefix="release-") as name:
         folder = Path(name)
+        begin = time.monotonic()
         wheel = built_wheel(python, folder)
-        print(f"{python}: {wheel.name}, {wheel.stat().st_size / 1e6:.1f} MB", flush=True)
+        built = time.monotonic()
+        print(
+            f"{python}: {wheel.name}, {wheel.stat().st_size / 1e6:.1f} MB, in {built - begin:.0f} s",
+            flush=True,
+        )
         installed = environment(python, folder / "installed")
-        needs = [f"cmpdesign[all,bench] @ {wheel.as_uri()}", *TEST_NEEDS]
+        needs = [f"cmpdesign[all,bench] @ {wheel.as_uri()}", *page_needs(ROOT)]
         subprocess.run([installed, "-m", "pip", "install", "--quiet", *needs], check=True)
+        print(f"{python}: installed in {time.monotonic() - built:.0f} s", flush=True)
         (folder / "pages").mkdir()
         return run_pages(installed, folder / "pages") == 0
 

@@ -50,7 +50,7 @@ def dataset(
     from cmpdesign.design.templates import find_plan
 
     where = parse_scheduler(scheduler, workers)
-    make_dataset(find_plan(plan), output, parse_shards(shards), where, _ignore)
+    make_dataset(find_plan(plan), output, parse_shards(shards), where)
     return load(output)
 
 
@@ -93,11 +93,6 @@ def extract(
         output,
         Reading(**reading),
         parse_scheduler(scheduler, workers),
-        _ignore,
         frames_a_shard,
     )
     return load(output)
-
-
-def _ignore(done: int, wanted: int) -> None:
-    """Show no progress."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import sys
 from typing import Annotated
 
 import typer
@@ -13,7 +15,8 @@ from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.starting import init, schema, templates
-from cmpdesign.cli.terminal import print_document
+from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
+from cmpdesign.errors import OutputError
 
 app = typer.Typer(
     cls=OneLineErrors,
@@ -22,8 +25,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # markup would swallow what stands in brackets in a help text
     help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.\n\n"
-    "Exit codes: 0 done, and what was judged is good; 1 done, and what was judged is not good; 2 bad input, or a file "
-    "that cannot be written; 130 stopped by Ctrl-C.",
+    "Exit codes: 0 done; 1 done, with a negative verdict or an early end; 2 bad input, or a file that cannot be "
+    "written; 130 stopped by Ctrl-C.",
     epilog=examples("cmpdesign build tac3d -o mine", "cmpdesign verify --help"),
 )
 for module, function in (
@@ -68,3 +71,12 @@ def main() -> None:
         app()
     except KeyboardInterrupt:  # before or after a command
         exit_interrupted()
+    except OutputError as error:  # the version
+        print_error(error)
+        sys.exit(EXIT_BAD_INPUT)
+    except OSError as error:  # help texts
+        if error.errno != errno.ENOSPC or error.filename is not None:
+            raise
+        discard_output()
+        print_error(f"standard output: cannot be written ({error.strerror})")
+        sys.exit(EXIT_BAD_INPUT)

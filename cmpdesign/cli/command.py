@@ -55,8 +55,9 @@ class Command(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         mode = Mode(*(ctx.params.pop(name) for name in NAMES))
-        use_mode(mode)
-        if mode.quiet and mode.verbose:
+        excluded = mode.quiet and mode.verbose
+        use_mode(mode._replace(verbose=mode.verbose and not excluded))
+        if excluded:
             raise CmpDesignError("--quiet and --verbose exclude each other; give one of them")
         for parameter in self.params:
             given = ctx.params.get(parameter.name)
@@ -116,10 +117,11 @@ def _finish_usage_error(error: Exception) -> None:
     """Of an error in the words, which quotes them: make its message printable, or print it as JSON and exit."""
     if not hasattr(error, "format_message"):
         return
-    message = error.format_message().replace(
-        ": Value error, ", ": ", 1
-    )  # the words of pydantic, which typer uses
-    text = shortened(visible(message, keep="\n"))
+    message = error.format_message()
+    if type(error).__name__ == "NoArgsIsHelpError":  # the message is the help text
+        return
+    # Pydantic, which typer uses, begins with "Value error".
+    text = shortened(visible(message.replace(": Value error, ", ": ", 1), keep="\n"))
     if current_mode().as_json:
         print_error(text)
         raise typer.Exit(EXIT_BAD_INPUT) from None

@@ -85,7 +85,7 @@ def recover_and_report(output: Path, rows_per_frame: int) -> None:
         say(f"wrote {printable_path(output)}: {recovered.frames} frames recovered")
     else:
         print_warning(
-            f"{printable_path(output)}: the run was ended before its first frame was written; what it left is removed"
+            f"{printable_path(output)}: the run ended before its first frame; the unfinished file is removed"
         )
     finish(
         lambda: RecoverDocument(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -12,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.data.files.webdataset import Member, read_member, read_members
-from cmpdesign.data.folder import Record, finished_records, number_of_shards, read_plan
+from cmpdesign.data.folder import Record, finished_records, number_of_shards, read_plan, shard_name
 from cmpdesign.errors import InputError
 from cmpdesign.files.images import Image, ImageFileError, decode_bytes
 from cmpdesign.inputs.documents import parse_json
+from cmpdesign.libraries import extra
 from extractor import Reference, load_layout
 
 # Columns that are arrays of V views -> numbers a marker.
 _BY_VIEW = {"rest_xy_px": 2, "true_xy_px": 2, "visible": 0, "xy_px": 2, "cov_px2": 3, "status": 0}
+_ENDINGS = {"images": ".tar", "tables": ".parquet"}
 _KEPT_SHARDS = 4  # tables and lists of members
 
 
@@ -71,6 +74,7 @@ class DataSet:
         self.folder = folder.resolve()
         self.plan = read_plan(self.folder)
         self._records: Sequence[Record] = finished_records(self.folder)
+        self._numbers = frozenset(self.shards)
         self._ends = np.cumsum([record["frames"] for record in self._records], dtype=np.int64)
 
     def __len__(self) -> int:
@@ -106,7 +110,8 @@ class DataSet:
         Raises:
             InputError: no such column or shard.
         """
-        import pyarrow
+        with extra("data"):
+            import pyarrow
 
         wanted = self.shards if shards is None else tuple(shards)
         tables = [self._read_table(shard, columns) for shard in wanted]
@@ -156,23 +161,19 @@ class DataSet:
         return _kept_members(self._path(shard, "images")) if has_images else {}
 
     def _path(self, shard: int, kind: str) -> Path:
-        record = next((record for record in self._records if record["shard"] == shard), None)
-        if record is None:
+        if shard not in self._numbers:
             raise InputError(f"{self.folder}: shard {shard} is not there; make it first")
-        name: str = next(name for name in record["files"] if name.startswith(f"{kind}/"))
-        return self.folder / name
+        return self.folder / kind / f"{shard_name(shard)}{_ENDINGS[kind]}"
 
     def _read_table(self, shard: int, columns: Sequence[str] | None) -> Any:
-        import pyarrow.parquet
-
         path = self._path(shard, "tables")
         if columns is None:
-            return _read_whole_table(path)
-        known = pyarrow.parquet.read_schema(path).names
+            return _read_parquet(path, None)
+        known = _read_schema(path).names
         strange = [name for name in columns if name not in known]
         if strange:
             raise InputError(f"{path}: has no column {strange[0]}; there are {', '.join(known)}")
-        return pyarrow.parquet.read_table(path, columns=list(columns), partitioning=None)
+        return _read_parquet(path, list(columns))
 
 
 def load(folder: str | Path) -> DataSet:
@@ -200,15 +201,39 @@ def _shaped(name: str, flat: NDArray[Any], views: int) -> NDArray[Any]:
     return flat.reshape(views, -1, width) if width else flat.reshape(views, -1)
 
 
-def _read_whole_table(path: Path) -> Any:
-    import pyarrow.parquet
+@contextmanager
+def _damage_told(path: Path) -> Iterator[None]:
+    """Tell of a table that is gone or damaged what helps."""
+    with extra("data"):
+        import pyarrow
 
-    return pyarrow.parquet.read_table(path, partitioning=None).combine_chunks()
+    try:
+        yield
+    except (pyarrow.ArrowException, OSError) as error:
+        raise InputError(
+            f"{path}: cannot be read ({str(error).splitlines()[0]}); make the shard again by the same command"
+        ) from None
+
+
+def _read_parquet(path: Path, columns: list[str] | None) -> Any:
+    with extra("data"):
+        import pyarrow.parquet
+
+    with _damage_told(path):
+        return pyarrow.parquet.read_table(path, columns=columns, partitioning=None).combine_chunks()
+
+
+def _read_schema(path: Path) -> Any:
+    with extra("data"):
+        import pyarrow.parquet
+
+    with _damage_told(path):
+        return pyarrow.parquet.read_schema(path)
 
 
 @lru_cache(maxsize=_KEPT_SHARDS)
 def _kept_table(path: Path) -> Any:
-    return _read_whole_table(path)
+    return _read_parquet(path, None)
 
 
 @lru_cache(maxsize=_KEPT_SHARDS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -22,10 +22,10 @@ from cmpdesign.data.schedule.schedulers import Scheduler, results
 from cmpdesign.data.shard import make_shard
 from cmpdesign.data.videos.extraction import Reading, index_source, name_tasks, prepare_extraction
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import require_libraries
+from cmpdesign.watch import tell
 from extractor import Reference
 
-# Called with (shards that are done, shards that are wanted) at the start and after every shard.
-Watch = Callable[[int, int], None]
 FRAMES_A_SHARD = 1000  # of an extraction
 
 
@@ -54,9 +54,7 @@ def parse_shards(text: str | int | None) -> ShardRange:
     return ShardRange(int(parts[0]), int(parts[1]))
 
 
-def make_dataset(
-    plan: str | Path, folder: str | Path, shards: ShardRange, scheduler: Scheduler, watch: Watch
-) -> Progress:
+def make_dataset(plan: str | Path, folder: str | Path, shards: ShardRange, scheduler: Scheduler) -> Progress:
     """Make the shards of a plan that are not done yet.
 
     Args:
@@ -64,13 +62,12 @@ def make_dataset(
         folder: the data set: a new folder, or that of an interrupted run of the same plan.
         shards: which shards.
         scheduler: where they are made.
-        watch: see ``Watch``.
 
     Raises:
         CmpDesignError: the plan cannot be carried out, or the folder holds something else; workers were lost.
         OutputError: a file cannot be written. Finished shards are kept, and in no case is a shard half-written.
     """
-    return _carry_out(prepare_plan(plan), Path(folder).resolve(), shards, scheduler, watch)
+    return _carry_out(prepare_plan(plan), Path(folder).resolve(), shards, scheduler)
 
 
 def extract_markers(
@@ -79,7 +76,6 @@ def extract_markers(
     folder: str | Path,
     reading: Reading,
     scheduler: Scheduler,
-    watch: Watch,
     frames_a_shard: int = FRAMES_A_SHARD,
 ) -> Progress:
     """Read the markers of all frames of videos and folders of pictures, part by part.
@@ -90,7 +86,6 @@ def extract_markers(
         folder: see ``make_dataset``.
         reading: how frames are read.
         scheduler: where parts are read.
-        watch: see ``Watch``.
         frames_a_shard: smallest number of frames of a part, but for the last of a source.
 
     Raises:
@@ -101,14 +96,11 @@ def extract_markers(
     tasks = name_tasks(sources, frames_a_shard)
     found: dict[str, dict[str, Any]] = {one["name"]: one for one in results(index_source, tasks, scheduler)}
     prepared = prepare_extraction(layout, [found[task.name] for task in tasks], reading)
-    return _carry_out(prepared, Path(folder).resolve(), ShardRange(), scheduler, watch)
+    return _carry_out(prepared, Path(folder).resolve(), ShardRange(), scheduler)
 
 
-def _carry_out(
-    prepared: Prepared, folder: Path, shards: ShardRange, scheduler: Scheduler, watch: Watch
-) -> Progress:
-    import pyarrow.parquet  # noqa: F401  # tell here, not in a worker, that it is missing
-
+def _carry_out(prepared: Prepared, folder: Path, shards: ShardRange, scheduler: Scheduler) -> Progress:
+    require_libraries("data", "pyarrow", "scipy", "threadpoolctl")
     end = prepared.shards if shards.end is None else shards.end
     if end > prepared.shards:
         raise CmpDesignError(
@@ -119,12 +111,12 @@ def _carry_out(
     digest = prepared.document["digest"]
     missing = [number for number in wanted if find_record(folder, digest, number) is None]
     done = len(wanted) - len(missing)
-    watch(done, len(wanted))
+    tell(done, len(wanted), "shards")
     try:
         with closing(results(partial(make_shard, str(folder)), missing, scheduler)) as made:
             for _ in made:
                 done += 1
-                watch(done, len(wanted))
+                tell(done, len(wanted), "shards")
     finally:
         clear_unfinished(folder, missing)
     return write_manifest(folder)

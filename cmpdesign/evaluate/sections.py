@@ -14,31 +14,30 @@ Document = Mapping[str, Any]
 DIFFERENCES_TITLE = "Why our figures differ from the article's"
 DIFFERENCES = (
     "The article measured two manufactured sensors at ten places; here one sensor is simulated with "
-    "either pattern, whose edges are as drawn: no color has run, no two squares stick but by the blur of "
-    "the lens.",
+    "each pattern. The edges are as drawn: no color has run, and squares stick only by the lens' blur.",
     "Geometry of the optics, size of the image, light, friction and thickness of the elastomer are "
     "assumed: the article states none of them. The elastomer is linear, and loads of this size strain it "
     "by far more than linear theory predicts well.",
 )
 DIFFERENCES_PRECISION = (
     "The cube's side is ten pitches of the square pattern. Where the cube lies along the square pattern's rows, a "
-    "whole row is missed at once. Turned at random, the patterns differ by much less, and virtual markers take most of "
-    "what is left. The change of the aligned cube says nothing of how finely a pattern resolves an edge.",
+    "whole row is missed at once. Turned at random, the patterns differ by much less, and virtual markers remove "
+    "most of the rest. The change at the aligned cube is no measure of how finely a pattern resolves an edge.",
     "Under a shear the bonded layer drags its surroundings along: half of the largest movement in y lies "
-    "millimetres outside the cube's face, whatever the pattern. Edge points chosen by their depth lie "
+    "millimetres outside the cube's face with both patterns. Edge points chosen by their depth lie "
     "under the face again.",
 )
 DIFFERENCES_RESPONSE = (
-    "With the friction assumed the cube's face sticks: the markers under it move with it, and around it "
-    "the layer follows. So the response is near 1 for either pattern, and little is left to differ.",
+    "With the assumed friction the cube's face sticks: the markers under it move with it, and the layer "
+    "around it follows. The response is near 1 for both patterns, which therefore differ by little.",
 )
 DIFFERENCES_RELIABILITY = (
-    "The square pattern is read by adaptive threshold, erosion, contours and sub-pixel corners. What the "
-    "former method did in detail the article does not say; a reader that tries several erosions loses "
+    "The square pattern is read by adaptive threshold, erosion, contours and sub-pixel corners. The "
+    "article does not describe the former method in detail; a reader that tries several erosions loses "
     "less to sticking.",
     "The multicolor pattern's numbering and its refinement fail apart: where 'multicolor unrefined' "
     "succeeds and 'multicolor' does not, all markers were found and numbered, and refinement then gave "
-    "some up or led them astray where the gridlines bend strongly.",
+    "some up or moved them to wrong places where the gridlines bend strongly.",
 )
 
 
@@ -245,8 +244,8 @@ def _shape_section(document: Document) -> Section:
         [
             "Each object is pressed by 2 mm. The displacement that the pattern's smooth field gives is compared with "
             "the true one, every 0.25 mm of the area that has moved by at least a tenth of the largest movement. Where "
-            "a marker has no place, its cells give no surface: an error counts only the area covered. Sigma is what "
-            "the reconstruction states of itself: 1 where it is true. At rest nothing is pressed."
+            "a marker has no place, its cells give no surface: an error counts only the area covered. Sigma is the "
+            "error over the reconstruction's stated deviation: 1 is right. At rest nothing is pressed."
         ],
         tables=[table],
         plots=[Plot("Error of the reconstructed surface, RMS.", plots.plot_bars(errors, "RMS, µm"))],

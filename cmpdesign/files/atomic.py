@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -13,9 +14,9 @@ from pathlib import Path
 from cmpdesign.errors import OutputError
 from cmpdesign.files.locks import Lock, open_for_lock, try_lock
 
-_STAGE_PREFIX = ".cmpdesign-"
+STAGE_PREFIX = ".cmpdesign-"
 # Names that ``tempfile.mkdtemp`` makes of the prefix.
-_STAGE_NAME = re.compile(re.escape(_STAGE_PREFIX) + "[a-z0-9_]{8}")
+_STAGE_NAME = re.compile(re.escape(STAGE_PREFIX) + "[a-z0-9_]{8}")
 
 
 class Stage:
@@ -37,7 +38,7 @@ class Stage:
     def __init__(self, parent: Path) -> None:
         remove_abandoned_stages(parent)
         while True:
-            self.folder = Path(tempfile.mkdtemp(prefix=_STAGE_PREFIX, dir=parent))
+            self.folder = Path(tempfile.mkdtemp(prefix=STAGE_PREFIX, dir=parent))
             self._descriptor = open_for_lock(self.folder)
             if self._descriptor is None:
                 return
@@ -78,10 +79,15 @@ def remove_abandoned_stages(parent: Path) -> None:
         if descriptor is None:
             continue
         try:
-            if try_lock(descriptor) is Lock.HELD and os.fstat(descriptor).st_uid == os.geteuid():
+            if try_lock(descriptor) is Lock.HELD and _is_own(descriptor):
                 shutil.rmtree(path, ignore_errors=True)
         finally:
             os.close(descriptor)
+
+
+def _is_own(descriptor: int) -> bool:
+    """True if an open file or folder belongs to the user; on Windows, which does not say so, always."""
+    return sys.platform == "win32" or os.fstat(descriptor).st_uid == os.geteuid()
 
 
 def _stages_in(parent: Path) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from enum import Enum
 from pathlib import Path
 
@@ -15,19 +16,42 @@ class Lock(Enum):
     UNSUPPORTED = "unsupported"  # by the system or the file system
 
 
+# Windows locks bytes, and nobody else can read a locked byte: this one lies behind the end of any file that is locked.
+_LOCKED_BYTE = 2**31 - 2
+
+
 def try_lock(descriptor: int) -> Lock:
-    """Try to lock an open file or folder against other processes, without waiting."""
+    """Try to lock an open file or folder against other processes, without waiting.
+
+    On Windows folders cannot be opened, and are not locked.
+    """
     try:
-        import fcntl
-    except ModuleNotFoundError:
-        return Lock.UNSUPPORTED
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        _lock(descriptor)
+    except (BlockingIOError, PermissionError):
         return Lock.TAKEN
     except OSError:
         return Lock.UNSUPPORTED
     return Lock.HELD
+
+
+if sys.platform == "win32":
+
+    def _lock(descriptor: int) -> None:
+        import msvcrt
+
+        place = os.lseek(descriptor, 0, os.SEEK_CUR)
+        try:
+            os.lseek(descriptor, _LOCKED_BYTE, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        finally:
+            os.lseek(descriptor, place, os.SEEK_SET)
+
+else:
+
+    def _lock(descriptor: int) -> None:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def open_for_lock(path: Path) -> int | None:

@@ -16,6 +16,7 @@ from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind, is_st
 DEFAULT_FPS = 30.0
 MAX_FAILED_READS = 10  # consecutive failures after which a stream counts as ended
 PHOTO_SUFFIXES = frozenset({".heic", ".heif", ".avif", ".dng"})  # what phones write beside JPEG
+MOST_DELAY_S = 1.0  # from a camera's time stamp to the arrival; beyond it, the stamps are of another clock
 STREAM_TIMEOUT_MS = 4000  # for opening and reading; a stop waits no longer
 
 
@@ -235,8 +236,34 @@ class VideoSource:
         return index / self.fps if self.fps else float("nan")
 
 
+class _LiveClock:
+    """Times of a live source's frames, s from the first one: the camera's time stamps, or times of arrival.
+
+    A stamp counts where it is later than the frame before, and not long before the arrival; some drivers give none.
+    """
+
+    def __init__(self) -> None:
+        self._start_s: float | None = None
+        self._offset_s: float | None = None
+        self._last_s = -1.0
+
+    def time_s(self, stamp_s: float, now_s: float) -> float:
+        """The time of a frame; ``stamp_s``: on the camera's clock, NaN without an image; ``now_s``: of its arrival."""
+        self._start_s = now_s if self._start_s is None else self._start_s
+        time_s = now_s - self._start_s
+        if self._offset_s is None and stamp_s == stamp_s:
+            self._offset_s = time_s - stamp_s
+        by_camera_s = stamp_s + (self._offset_s or 0.0)
+        if by_camera_s > self._last_s and time_s - by_camera_s < MOST_DELAY_S:
+            time_s = by_camera_s
+        self._last_s = max(time_s, self._last_s)
+        return self._last_s
+
+
 class LiveSource:
-    """A camera by its number, or a stream by its address; time stamps are times of arrival, from the first frame.
+    """A camera by its number, or a stream by its address; time stamps are the camera's, from the first frame.
+
+    Where the camera gives none, they are times of arrival.
 
     Args:
         source: number or address.
@@ -258,19 +285,21 @@ class LiveSource:
 
     def frames(self) -> Iterator[SourceFrame]:
         """Frames until the camera or stream stops."""
-        start: float | None = None
-        failed, index = 0, 0
+        import cv2
+
+        clock, failed, index = _LiveClock(), 0, 0
         try:
             while failed < MAX_FAILED_READS:
                 success, image = self._capture.read()
-                now = time.monotonic()
-                start = now if start is None else start
-                if success and image is not None:
+                has_image = success and image is not None
+                stamp_s = float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) / 1e3 if has_image else float("nan")
+                time_s = clock.time_s(stamp_s, time.monotonic())
+                if has_image:
                     failed = 0
-                    yield SourceFrame(now - start, image)
+                    yield SourceFrame(time_s, image)
                 else:
                     failed += 1
-                    yield SourceFrame(now - start, None, f"the {self.name.partition(' ')[0]} gave no image")
+                    yield SourceFrame(time_s, None, f"the {self.name.partition(' ')[0]} gave no image")
                 index += 1
         finally:
             self._capture.release()

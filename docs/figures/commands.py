@@ -27,8 +27,8 @@ Every command has these options:
 
 | exit code | means |
 |---|---|
-| 0 | done; what was judged is good |
-| 1 | done; what was judged is not good: not verified, not buildable, nothing tracked, a run that ended early |
+| 0 | done |
+| 1 | done, with a negative verdict or an early end: not verified, not buildable, nothing tracked |
 | 2 | bad input, or a file that cannot be written: one line on standard error, and nothing half-written |
 | 130 | stopped by Ctrl-C; every file that was written is complete |
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks import accuracy, extraction
 from benchmarks.camera import page as camera
+from benchmarks.datasets import run as datasets
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.pooled import PooledResult
 from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture, pooled_markdown
@@ -60,6 +61,7 @@ def pages() -> dict[Path, str]:
         blocks
         | accuracy.documentation_blocks(precise)
         | extraction.markdown(read_measured("extraction"))
+        | datasets.markdown(read_measured("datasets"))
         | camera.documentation_blocks(read_measured("camera"))
     )
 

@@ -201,7 +201,7 @@ class Refiner:
             start = with_roughness(topology, start, by_synthesis=False)
             return self._final_profiles(view, start, contrasts, places)
         usual_px = median_edge(start.xy, topology.edges)
-        estimate = self._synthesis_solver.steps(view, start, schedule.steps, usual_px)
+        estimate = self._synthesis_solver.steps(view, start, schedule, usual_px)
         return self._accept_or_recover(view, estimate, contrasts, places)
 
     def _final_profiles(

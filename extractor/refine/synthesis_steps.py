@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
+from extractor.presets import Schedule
 from extractor.refine.drawn_pattern import Synthesis, draw_pattern
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_offsets import GridlineReading
@@ -46,15 +47,11 @@ class SynthesisLimits(NamedTuple):
         rule: by which gridlines are weighed.
         step: of the step.
         dot_gain: of the dot gain.
-        small_move: standard deviations, the typical move of markers in a step after which no step follows. A further
-            step would move them by about a fifth of it. 0.25 costs at most 1.6 % of the RMS of a suite, and saves a
-            fifth to a third of the steps: measured with `python -m benchmarks.ablation --rule "small move"`.
     """
 
     rule: MisfitRule = PIXEL_MISFIT_RULE
     step: StepLimits = STEP_LIMITS
     dot_gain: DotGainLimits = DOT_GAIN_LIMITS
-    small_move: float = 0.25
 
 
 LIMITS = SynthesisLimits()
@@ -113,24 +110,24 @@ class SynthesisSolver:
             kept[shape] = np.zeros(shape, np.float32)
         return kept[shape]
 
-    def steps(self, view: PyramidLevel, estimate: Estimate, most: int, usual_px: float) -> Estimate:
+    def steps(self, view: PyramidLevel, estimate: Estimate, schedule: Schedule, usual_px: float) -> Estimate:
         """The estimate after steps over all markers, until a step hardly moves them.
 
         Args:
             view: the image.
             estimate: with its pattern where the last step left the markers.
-            most: number of steps at most.
+            schedule: how many steps at most, and after which move none follows.
             usual_px: a usual edge in the view.
         """
         wide_blur = estimate.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
-        for step in range(most):
+        for step in range(schedule.steps):
             if step > 0:
                 estimate = with_pattern_moved(self._topology, estimate)
             judged = step > 0  # the misfit of the first step is that of its start
             stepped, drawing = self._full_step(view, self._with_bending(estimate, wide_blur, judged), judged)
             estimate = _overlap_corrected(stepped, drawing)
-            move = typical_move(estimate.measured - drawing.xy, estimate.information)
-            if judged and move < LIMITS.small_move:
+            shift = estimate.measured - drawing.xy
+            if judged and typical_move(shift, estimate.information) < schedule.small_move:
                 break
         remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawing.edge_px) ** 2 if wide_blur else 0.0
         cov = convergence_covariance(estimate.measured - drawing.xy, drawing.sigma, remaining)

@@ -226,5 +226,5 @@ def _frame_reason(rig: Rig, tracked: Sequence[Tracked], shape: Shape, found: boo
     if not reasons and shape.problem:
         reasons = [shape.problem]
     if not reasons and not found:
-        reasons = ["the views have no marker in common that can be believed"]
+        reasons = ["the views have no reliable marker in common"]
     return "; ".join(reasons)

@@ -63,7 +63,7 @@ def test_rules_are_told_apart_by_name() -> None:
     assert len({rule.name for rule in RULES}) == len(RULES)
     assert {rule.kind for rule in RULES} == {"accuracy", "no wrong id"}
     assert {rule.stage for rule in RULES} == {
-        *("pipeline", "image", "cells", "numbering", "localmap", "complete")
+        *("pipeline", "image", "cells", "numbering", "localmap", "refine", "complete")
     }
 
 

@@ -38,6 +38,7 @@ ROOT = Path(__file__).parents[2]
         ("rendering", {"conditions", "errors", "speeds"}),
         ("contact", {"conditions", "contacts", "closed_forms_percent"}),
         ("medium", {"conditions", "results"}),
+        ("datasets", {"conditions", "rates", "bytes", "overheads"}),
         (
             "extraction",
             {"conditions", "presets", "large", "over_pixels", "over_markers", "growth"},

@@ -8,6 +8,8 @@ In the Markdown files, fenced blocks are run in order, page by page, in a folder
 * ``python``: run with the names of the blocks before; a ``text`` block right after it is what it prints.
 * ``toml NAME``: becomes the file NAME.
 
+In a table whose first column is "you see", what stands in that column as code is printed by a command of the page.
+
 Printed and documented texts must be equal, but for these: blanks at a line's end; a line "..." stands for any
 lines; a number before " ms" may be any; of other decimals, the last digit may differ by 2.
 """
@@ -105,7 +107,8 @@ def near(one: str, other: str) -> bool:
     return len(one.partition(".")[2]) == places and abs(float(one) - float(other)) <= 2.001 * 10.0**-places
 
 
-def run_console(text: str) -> None:
+def run_console(text: str) -> str:
+    everything_printed = ""
     for command, output in commands(text):
         line, _, comment = command.partition("    # ")
         wanted = int(comment.removeprefix("exit code ")) if comment.startswith("exit code ") else 0
@@ -113,6 +116,17 @@ def run_console(text: str) -> None:
         assert code == wanted, f"{line}: exit code {code}\n{printed}"
         if output:
             assert differs(printed, output) is None, differs(printed, output)
+        everything_printed += printed
+    return everything_printed
+
+
+def quoted_lines(page: Path) -> list[str]:
+    """What the column "you see" of a page's tables quotes."""
+    tables = re.findall(
+        r"^\| you see \|.*\n\|[-|]+\|\n((?:\|.*\n)+)", page.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    cells = [row.split(" | ")[0] for table in tables for row in table.splitlines()]
+    return [quote for cell in cells for quote in re.findall(r"`([^`]+)`", cell)]
 
 
 QUICK_BENCHMARKS = {"benchmarks.damage"}
@@ -161,20 +175,22 @@ def run_python(block: Block, names: dict[str, Any], page: str) -> None:
 @pytest.mark.parametrize(
     "page",
     [pytest.param(page, marks=pytest.mark.slow if page.stem in SLOW_PAGES else ()) for page in PAGES],
-    ids=lambda page: page.stem,
+    ids=lambda page: page.stem if page.parent.name != "tutorials" or page.stem != "README" else "tutorials",
 )
 def test_every_command_and_snippet_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", COLUMNS)
     names: dict[str, Any] = {}
+    printed = ""
     for block in blocks(page):
         if block.language == "console":
-            run_console(block.text)
+            printed += run_console(block.text)
         elif block.language == "python":
             run_python(block, names, page.name)
         else:
             assert block.language == "toml" and block.name, f"{page.name}: a block of {block.language}"
             Path(block.name).write_text(block.text, encoding="utf-8")
+    assert [quote for quote in quoted_lines(page) if quote not in printed] == []
 
 
 def test_the_readmes_figure_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,11 +204,18 @@ def test_the_readmes_figure_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert figures["RMS error per axis"] <= float(stated[1])
 
 
-def test_every_path_of_the_map_exists() -> None:
-    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    paths = re.findall(r"`((?:extractor|cmpdesign|benchmarks|tests|tools|docs)/[\w/.]*)`", page)
+def test_every_path_on_the_pages_exists() -> None:
+    """Of the pages of docs/ only paths of sources: reliability.md names tests by their path below tests/."""
+    map_page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    paths = re.findall(r"`((?:extractor|cmpdesign|benchmarks|tests|tools|docs)/[\w/.]*)`", map_page)
     assert len(paths) > 25
-    assert [path for path in paths if not (ROOT / path).exists()] == []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        paths += re.findall(
+            r"`((?:extractor|cmpdesign|benchmarks|tests|templates|examples)/[\w/]+\.\w+)`", text
+        )
+    gone = [path for path in paths if not (ROOT / path).exists() and not (ROOT / "tests" / path).exists()]
+    assert gone == []
 
 
 @pytest.mark.parametrize("name", ["reference/reliability.md", "explanation/hard-cases.md"])

@@ -48,6 +48,11 @@ def test_uncommitted_files_are_told(tmp_path: Path) -> None:
     assert release.uncommitted(tmp_path) == ["uncommitted: a.txt"]
 
 
+def test_what_runs_the_pages_is_declared() -> None:
+    needs = release.page_needs(release.ROOT)
+    assert [need.split(">")[0] for need in needs] == list(release.TEST_NEEDS)
+
+
 @pytest.mark.slow
 def test_the_wheel_of_this_python_runs_the_pages() -> None:
     assert release.try_python(sys.executable)

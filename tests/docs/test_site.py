@@ -22,20 +22,23 @@ def build(config: Path, site: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, env=environment)
 
 
+def in_site(path: Path) -> Path:
+    """Where a file of the repository lies in the site."""
+    if path.suffix != ".md":
+        return path
+    return path.with_name("index.html") if path.name == "README.md" else path.with_suffix(".html")
+
+
 def test_the_site_has_every_page_behind_its_door(tmp_path: Path) -> None:
     done = build(ROOT / "mkdocs.yml", tmp_path / "site")
     assert done.returncode == 0, done.stderr
     pages = [path.relative_to(ROOT / "docs") for path in sorted((ROOT / "docs").rglob("*.md"))]
     start = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
-    for page in pages:
-        assert (tmp_path / "site" / page.with_suffix(".html")).is_file()
-        assert f'href="{page.with_suffix(".html").as_posix()}"' in start, (
-            f"{page} has no place in the navigation"
-        )
+    for page in map(in_site, pages):
+        assert (tmp_path / "site" / page).is_file()
+        assert f'href="{page.as_posix()}"' in start, f"{page} has no place in the navigation"
     for path in outside_files([ROOT / "docs" / page for page in pages]):
-        copy = tmp_path / "site" / "project" / path.relative_to(ROOT)
-        page = copy.with_name("index.html") if path.name == "README.md" else copy.with_suffix(".html")
-        assert (page if path.suffix == ".md" else copy).is_file()
+        assert (tmp_path / "site" / "project" / in_site(path.relative_to(ROOT))).is_file()
 
 
 @pytest.mark.slow

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
+import tarfile
 import tomllib
+from pathlib import Path
 
 from cmpdesign.libraries import EXTRAS
 from tools.package_page import ROOT, absolute_links, dynamic_metadata, project_address
@@ -40,6 +43,17 @@ def test_the_address_stands_in_one_place() -> None:
     assert found.stdout.split() in ([], ["pyproject.toml"])  # nothing where no git is
 
 
+def test_the_source_archive_can_make_the_page(tmp_path: Path) -> None:
+    code = f"from scikit_build_core.build import build_sdist; build_sdist({str(tmp_path)!r})"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=True)
+    (path,) = tmp_path.iterdir()
+    with tarfile.open(path) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+        described = archive.extractfile(f"{path.name.removesuffix('.tar.gz')}/PKG-INFO")
+        assert described is not None and f"]({project_address()}/raw/main/".encode() in described.read()
+    assert {"README.md", "pyproject.toml", "tools/package_page.py"} <= names
+
+
 def test_every_python_version_that_is_tested_is_told() -> None:
     told = {line.rpartition(" ")[2] for line in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", line)}
     workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
@@ -49,8 +63,7 @@ def test_every_python_version_that_is_tested_is_told() -> None:
 def test_extras_are_those_that_messages_name() -> None:
     extras = PROJECT["optional-dependencies"]
     assert set(EXTRAS) == set(extras) - {"all", "bench", "dev"}
-    (everything,) = extras["all"]
-    named = set(everything.partition("[")[2].rstrip("]").split(","))
+    named = set(re.findall(r"\w+", " ".join([*extras["all"], *extras["dask"]])))
     assert set(EXTRAS) - named == {"rerun"}
     assert any(line.startswith("cmpdesign[all") for line in extras["dev"])
 

@@ -169,3 +169,31 @@ def test_wheel_works_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
     verdict = json.loads(cmpdesign("verify", "made/layout.json", "view.png", "--json"))
     assert verdict["verified"] is True
     assert verdict["images"][0]["measured"] == 61
+
+
+MOST_BASE_MIB = 350  # as du -sm counts
+
+
+@pytest.mark.slow
+def test_a_base_installation_is_small_and_names_what_it_lacks(wheel: Path, tmp_path: Path) -> None:
+    """As ``pip install .`` leaves it, pip included; the libraries come from the package index."""
+    venv.create(tmp_path / "base", with_pip=True)
+    interpreter = tmp_path / "base" / "bin" / "python"
+    options = ["--quiet", "--disable-pip-version-check", "--constraint", str(ROOT / "requirements.lock")]
+    subprocess.run([interpreter, "-m", "pip", "install", *options, wheel], check=True, timeout=600)
+    files = [path.lstat() for path in (tmp_path / "base").rglob("*")]
+    assert sum(512 * file.st_blocks for file in files) / 2**20 < MOST_BASE_MIB
+    code = "from cmpdesign.cli import main; main()"
+    for words in (
+        "build elliptical -o made --set layers=4",
+        "render made/layout.json -o seen.png --pitch 30 --noise 1",
+        "verify made/layout.json seen.png",
+    ):
+        result = python(code, *words.split(), executable=interpreter, cwd=tmp_path)
+        assert result.returncode == 0, result.stderr
+    for product, extra in (("laser", "laser"), ("mold", "cad"), ("mesh", "cad"), ("print", "print")):
+        words = ["build", "honeycomb", "-o", "pad", "--set", "layers=2", "--only", product]
+        result = python(code, *words, executable=interpreter, cwd=tmp_path)
+        assert result.returncode == 2 and f"of the extra [{extra}]" in result.stderr
+        assert f"{wheel}[{extra}]" in result.stderr and result.stderr.count("\n") == 1
+    assert not (tmp_path / "pad").exists()

@@ -38,17 +38,18 @@ def build(
     ] = Path("out"),
     override: SetOption = None,
     only: Annotated[
-        str, typer.Option(metavar="NAMES", help=f"What to make, separated by commas: {', '.join(PRODUCTS)}.")
+        str,
+        typer.Option(metavar="NAMES", help=f"Products to make, separated by commas: {', '.join(PRODUCTS)}."),
     ] = USUAL_NAMES,
     camera: CameraOption = CAMERA_TEXT,
     preset: PresetOption = "balanced",
 ) -> None:
     """Write a design's files.
 
-    These are the SVG, the layout file, a preview and a report, or what --only names.
+    The files are the SVG, the layout file, a preview and a report, or the products that --only names.
     Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, and so
     are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
-    prints are read as the camera sees them before files are written. Exit code 1 when something will not work.
+    prints are read as the camera sees them before files are written. Exit code 1: a finding is an error.
     """
     from dataclasses import asdict
 
@@ -75,7 +76,9 @@ def build(
     for name, reading in built.readings.items():
         say(f"{name} as made: {reading.line()}")
     for path in built.of_other_designs:
-        print_warning(f"{printable_path(path)} belongs to another design; remove it or build it again")
+        print_warning(
+            f"{printable_path(path)} belongs to another design; remove the file, or build that design again"
+        )
     for finding in built.findings:
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")

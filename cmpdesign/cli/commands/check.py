@@ -18,7 +18,7 @@ from cmpdesign.cli.options.designs import (
 )
 from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import working
-from cmpdesign.cli.terminal import finish, print_warning, say
+from cmpdesign.cli.terminal import finish, print_step, print_warning, say
 
 if TYPE_CHECKING:
     from cmpdesign.layout.checks import Finding
@@ -38,7 +38,7 @@ def check(
     ] = False,
     preset: PresetOption = "balanced",
 ) -> None:
-    """List what cannot be made or read. Exit code 1 when something will not work."""
+    """List the features of a design that cannot be made or read. Exit code 1: a finding is an error."""
     from cmpdesign.cli.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
@@ -48,6 +48,7 @@ def check(
     camera_px = parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
+    print_step(f"{parameters.name}: layout of {len(layout.marker_xy_mm)} markers")
     with working("drawing and reading pads" if read else "checking") as steps, watched(steps.tell):
         checked = check_products(parameters, layout, camera_px, read=read, preset=preset)
     for name, reading in checked.readings.items():
@@ -71,7 +72,7 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     from rich.table import Table
 
     if not findings:
-        say("nothing to report: it can be made and read")
+        say("no findings: the design can be made and read")
         return
     table = Table(box=None, pad_edge=False)
     for heading in ("severity", "what", "value", "limit", "unit", "remedy"):

@@ -12,7 +12,7 @@ import typer
 from cmpdesign.cli.command import Command, Group, examples
 from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import progress_bar
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.defaults import USUAL_TRIALS
 
@@ -30,13 +30,15 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Repeat the article's experiments on a simulated sensor, and compare designs.\n\nWrites report.html and "
-    "report.json. An interrupted run goes on where it stopped.",
+    "report.json. A run that was interrupted continues where it stopped.",
 )
 
 Output = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the report and the journal.")
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Of everything random: the same seed gives the same figures.")]
+Seed = Annotated[
+    int, typer.Option(min=0, help="Seed of all random values: the same seed gives the same figures.")
+]
 Workers = Annotated[
     int | None, typer.Option(min=1, help="Processes. [default: one for each core]", show_default=False)
 ]
@@ -62,7 +64,7 @@ def precision(
     sensor: SensorOption = "tac3d",
     preset: PresetOption = "balanced",
 ) -> None:
-    """Five pressed objects against the truth, and the edge fitting error of a cube."""
+    """Measure the error on five pressed objects, and the edge fitting error of a cube."""
     run = _run_experiment("precision", output, trials, seed, workers, sensor, preset)
     for mode, one in run.document["edge_fit_error_mm"].items():
         say(
@@ -88,7 +90,7 @@ def response(
     sensor: SensorOption = "tac3d",
     preset: PresetOption = "balanced",
 ) -> None:
-    """How much of a shear the markers under a cube show."""
+    """Measure the share of a shear that the markers under a cube show."""
     run = _run_experiment("response", output, trials, seed, workers, sensor, preset)
     for case, one in run.document["response"].items():
         say(
@@ -115,7 +117,7 @@ def reliability(
     sensor: SensorOption = "tac3d",
     preset: PresetOption = "balanced",
 ) -> None:
-    """How often both patterns are read under a ball that presses, then twists or shears."""
+    """Count how often both patterns are read under a ball that presses, then twists or shears."""
     run = _run_experiment("reliability", output, trials, seed, workers, sensor, preset)
     for mode, methods in run.document["modes"].items():
         counts = ", ".join(f"{name} {one['successful']}" for name, one in methods.items())
@@ -131,7 +133,7 @@ def reliability(
     ),
 )
 def angles(output: Output, workers: Workers = None) -> None:
-    """How far a single cell may deform or turn before it is lost, against eqs. 1 and 2."""
+    """Measure how far a single cell can deform or turn before the cell is lost, against eqs. 1 and 2."""
     run = _run_experiment("angles", output, USUAL_TRIALS["angles"], 0, workers, "tac3d", "balanced")
     for name, one in run.document["cells"].items():
         for what, limit in one.items():
@@ -162,7 +164,7 @@ def designs(
     sensor: SensorOption = "tac3d",
     preset: PresetOption = "balanced",
 ) -> None:
-    """Score any designs on one sensor: error, share measured, smallest feature, laser time."""
+    """Compare designs on one sensor: error, share measured, smallest feature, laser time."""
     run = _run_experiment("designs", output, trials, seed, workers, sensor, preset, _design_entries(design))
     for name, one in run.document["designs"].items():
         error = one["surface_rms_mm"]["mean"]
@@ -222,7 +224,7 @@ def _run_experiment(
     try:
         document, files = run_experiment(find_experiment(name, designs), options, output, bar=_trials_bar)
     except KeyboardInterrupt:
-        print_warning("interrupted; the same command goes on where it stopped")
+        print_warning("interrupted; run the same command again to continue")
         raise typer.Exit(EXIT_INTERRUPTED) from None
     for path in files:
         say(f"wrote {printable_path(path)}")
@@ -230,6 +232,7 @@ def _run_experiment(
 
 
 def _trials_bar(title: str, total: int, done: int) -> AbstractContextManager[Callable[[str], None]]:
+    print_step(f"{title}: {total} trials, {done} of them done by an earlier run")
     return progress_bar(title, total, done=done, unit="trials")
 
 

@@ -11,7 +11,7 @@ import typer
 
 from cmpdesign.cli.options.images import MaxPixelsOption
 from cmpdesign.cli.options.response import METAVAR, parse_reading_response
-from cmpdesign.cli.terminal import finish, say
+from cmpdesign.cli.terminal import finish, print_step, printable_path, say
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
@@ -39,12 +39,12 @@ def kerf(
         str | None,
         typer.Option(
             metavar=METAVAR,
-            help="How light became values. [default: as the file states, else sRGB, corrected by the edges]",
+            help="Response of the camera. [default: as the file states, else sRGB, corrected by the edges]",
         ),
     ] = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Measure the kerf on a cut coupon. The lines are ready for the material's file."""
+    """Measure the kerf on a cut coupon, and print the lines for the material's file."""
     from cmpdesign.api import workshop
     from cmpdesign.cli.documents.reading import KerfDocument
     from cmpdesign.products.laser.coupon.design import load_coupon
@@ -57,6 +57,7 @@ def kerf(
         response=parse_reading_response(response),
         max_pixels=max_pixels,
     )
+    print_step(f"{printable_path(photo)} is read")
     _print_kerf_table(cut_coupon, reading)
     say(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
     for patch_kerf in reading.patches:

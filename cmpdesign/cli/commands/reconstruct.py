@@ -66,19 +66,17 @@ def reconstruct(
         bool, typer.Option("--from-rest", help="Place all views by REST, also those whose pose RIG gives.")
     ] = False,
     flatness_mm: Annotated[
-        float, typer.Option(metavar="MM", help="How far the markers may lie off the plane at rest.")
+        float, typer.Option(metavar="MM", help="Largest distance of the markers from a plane at rest.")
     ] = 0.0,
     model_px: Annotated[
         float | None,
-        typer.Option(
-            metavar="PX", help="What the camera model leaves open. [default: as the rest frame says]"
-        ),
+        typer.Option(metavar="PX", help="Error of the camera model, pixels. [default: from the rest frame]"),
     ] = None,
     surface: Annotated[
         bool,
         typer.Option(
             "--surface",
-            help="Also give the touched surface, by the [elastomer] of RIG, in columns of its own.",
+            help="Also write the touched surface, computed with the [elastomer] of RIG, in columns of its own.",
         ),
     ] = False,
     fps: Annotated[
@@ -157,7 +155,7 @@ def _describe_positions(depth_mm: float | None, is_continued: bool) -> str:
     if is_continued:
         return f"of the pattern, {depth_mm:g} mm below the touched surface; surface_* of that surface"
     if depth_mm is None:
-        return "of the pattern; RIG does not say how far below the touched surface it lies"
+        return "of the pattern; RIG does not state the pattern's depth below the touched surface"
     if depth_mm == 0:
         return "of the pattern, which RIG puts on the touched surface"
     return f"of the pattern, {depth_mm:g} mm below the touched surface; not of that surface"

@@ -15,7 +15,7 @@ from cmpdesign.cli.options.designs import complete_scene
 from cmpdesign.cli.options.paths import require_suffix
 from cmpdesign.cli.options.pixels import parse_pixels
 from cmpdesign.cli.options.response import METAVAR, parse_response
-from cmpdesign.cli.terminal import finish, printable_path, say
+from cmpdesign.cli.terminal import finish, print_step, printable_path, say
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
@@ -95,7 +95,9 @@ def render(
     ] = None,
     press: Annotated[
         float,
-        typer.Option(callback=require_finite, help="How far a press at the centre moves the markers, mm."),
+        typer.Option(
+            callback=require_finite, help="Largest displacement of the markers by a press at the centre, mm."
+        ),
     ] = 0.0,
     press_radius: Annotated[
         float | None,
@@ -113,7 +115,7 @@ def render(
         str,
         typer.Option(
             metavar=METAVAR,
-            help="How light becomes values; with an exponent light is value ** exponent.",
+            help="Response of the camera; with an exponent light is value ** exponent.",
         ),
     ] = "srgb",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
@@ -174,6 +176,7 @@ def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: 
     from cmpdesign.scene import save_truth
 
     rendered = render_scene(scene, size=pixels)
+    print_step("the image is rendered")
     if truth is not None:
         save_truth(rendered.truth, truth)
         say(f"wrote {printable_path(truth)}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from cmpdesign.cli.options.paths import require_suffix
 from cmpdesign.cli.progress import progress_bar
-from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ def _render_image(file: SceneFile, output: Path, truth: Path | None) -> None:
     except CmpDesignError as error:
         raise CmpDesignError(f"{error} (the scene has no [sequence])") from None
     rendered = render(file.scene(), size=file.size_px)
+    print_step("the image is rendered")
     for warning in rendered.warnings:
         print_warning(warning)
     if truth is not None:

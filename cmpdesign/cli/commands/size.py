@@ -19,7 +19,7 @@ EXAMPLES = (
 def size(
     camera: Annotated[str, typer.Option(metavar="WxH", help="Pixels of the camera, as in 1280x960.")],
     view: Annotated[
-        str, typer.Option(metavar="WxH", help="What it sees of the pattern's plane, as in 24x18mm.")
+        str, typer.Option(metavar="WxH", help="Field of view in the pattern's plane, as in 24x18mm.")
     ],
     error: Annotated[
         str | None,
@@ -34,7 +34,7 @@ def size(
         typer.Option("-o", "--output", metavar="FILE", help="TOML file to write, which build takes."),
     ] = None,
 ) -> None:
-    """Which pitch and how many layers for a camera and its field of view, with the error that markers then have."""
+    """Propose pitch and layers for a camera and its field of view, with the markers' predicted error."""
     from cmpdesign.cli.documents.designs import SizeDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.proposal import camera_design

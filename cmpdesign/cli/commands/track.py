@@ -54,7 +54,8 @@ def track(
     rest: Annotated[
         str | None,
         typer.Option(
-            metavar="N|IMAGE", help="What displacement is counted from. [default: the first tracked frame]"
+            metavar="N|IMAGE",
+            help="Frame or image from which displacement is counted. [default: the first tracked frame]",
         ),
     ] = None,
     mm_per_px: Annotated[
@@ -68,7 +69,7 @@ def track(
     ] = None,
     frames: FramesOption = None,
     overlay: Annotated[
-        Path | None, typer.Option(metavar="VIDEO", help="Video of what was found: .mp4, .avi or .mkv.")
+        Path | None, typer.Option(metavar="VIDEO", help="Video of the found markers: .mp4, .avi or .mkv.")
     ] = None,
     quiver: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Arrows of the frame with the largest displacement.")
@@ -156,7 +157,7 @@ def _print_summary(summary: Mapping[str, Any]) -> None:
     if summary["quality"] is not None:
         rows["image quality"] = quality_text(summary["quality"])
         if summary["quality"]["hints"]:
-            rows["what to do"] = "; ".join(summary["quality"]["hints"])
+            rows["remedy"] = "; ".join(summary["quality"]["hints"])
     if largest is not None:
         mm = "" if largest["mm"] is None else f" = {largest['mm']:.4g} mm"
         rows["largest displacement"] = (

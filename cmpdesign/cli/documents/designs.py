@@ -72,7 +72,7 @@ class SizeDocument(Document):
     format: Literal["cmp-size"] = "cmp-size"
     version: Literal[1] = 1
     camera_px: tuple[int, int] = Field(description="Width and height.")
-    view_mm: tuple[float, float] = Field(description="What the camera sees, width and height.")
+    view_mm: tuple[float, float] = Field(description="Field of view, width and height.")
     scale_px_per_mm: float
     design: dict[str, Any] = Field(description="The fields of a design file.")
     markers: int
@@ -81,7 +81,7 @@ class SizeDocument(Document):
     error_um: float
     rim_error_um: float
     told_apart_mm: float = Field(description="Distance of two touches that can be told apart.")
-    limit: str = Field(description="What keeps the pattern from being finer.")
+    limit: str = Field(description="Limit that a finer pattern would exceed.")
 
 
 class TemplatePart(Part):

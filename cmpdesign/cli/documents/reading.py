@@ -19,7 +19,7 @@ class QualityPart(Part):
     evenness: float | None = Field(description="Of the light, 0 to 1.")
     edge_px: float | None = Field(description="Length of a gridline.")
     weakest_inks: tuple[str, ...]
-    hints: tuple[str, ...] = Field(description="What limits the result, and what to do.")
+    hints: tuple[str, ...] = Field(description="Limits of the result, with remedies.")
 
 
 class SheetPart(Part):
@@ -45,7 +45,7 @@ class ImagePart(Part):
     image: str = Field(description="Its path, or the name of a source and the number of a frame.")
     verified: bool
     error: str | None = Field(None, description="Why the picture could not be read.")
-    reason: str | None = Field(None, description="Why it is not verified.")
+    reason: str | None = Field(None, description="Why the picture is not verified.")
     present: int | None = Field(None, description="Markers that are visible in the layout.")
     measured: int | None = None
     repaired: int | None = None
@@ -104,7 +104,7 @@ class KerfDocument(Document):
     thickness_mm: float
     response: str
     scale_px_mm: float = Field(description="px in a mm.")
-    fit_mm: float = Field(description="How well the coupon's marks fit.")
+    fit_mm: float = Field(description="RMS residual of the coupon's marks.")
     patches: tuple[PatchPart, ...]
 
 

@@ -8,7 +8,7 @@ from cmpdesign.errors import CmpDesignError
 
 METAVAR = "srgb|linear|EXPONENT"
 READING_HELP = (
-    "How light became values; with an exponent light is value ** exponent. [default: 8 bits srgb, 16 linear]"
+    "Response of the camera; with an exponent light is value ** exponent. [default: 8 bits srgb, 16 linear]"
 )
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cmpdesign.contact import Contact
 from cmpdesign.data.frames.distributions import value_at, varying_leaves
 from cmpdesign.data.frames.frame import FrameRecord, document_text
+from cmpdesign.libraries import extra
 from extractor import Markers
 
 PREFIX = "scene."  # of the columns with drawn values
@@ -155,7 +156,8 @@ def _flat(values: NDArray[Any]) -> NDArray[Any]:
 
 def arrow_schema(columns: Mapping[str, str], about: Mapping[str, str]) -> Any:
     """The Arrow schema of columns, with texts on the whole table."""
-    import pyarrow
+    with extra("data"):
+        import pyarrow
 
     makers: dict[str, Callable[[], Any]] = {
         "bool": pyarrow.bool_,
@@ -182,8 +184,9 @@ def write_table(
     Raises:
         OSError: the file cannot be written.
     """
-    import pyarrow
-    import pyarrow.parquet
+    with extra("data"):
+        import pyarrow
+        import pyarrow.parquet
 
     schema = arrow_schema(columns, about)
     arrays = [pyarrow.array([row[field.name] for row in rows], type=field.type) for field in schema]

@@ -125,6 +125,9 @@ class FrameMaker:
 
     def _record(self, number: int, attempt: int, design: ReadableDesign, file: SceneFile) -> FrameRecord:
         solved = next(file.solved_scenes())
+        most, contact = self._plan["largest_strain"], solved.contact
+        if most is not None and contact is not None and contact.largest_strain > most:
+            raise SceneError(f"the largest strain is {contact.largest_strain:.2g}, the plan's limit {most:g}")
         rendered = render(solved.scene, size=file.size_px)
         image = self._encode(rendered.image)
         return FrameRecord(

@@ -71,6 +71,9 @@ class PlanTable(_Table):
     seed: int = Field(0, ge=0)
     designs: list[str] = Field(min_length=1, max_length=1000)
     weights: list[float] | None = None
+    largest_strain: float | None = Field(
+        None, gt=0, description="Contacts of a larger strain are drawn anew; null: none."
+    )
     image: ImageTable = Field(default_factory=lambda: ImageTable.model_validate({}))
     markers: MarkersTable = Field(default_factory=lambda: MarkersTable.model_validate({}))
     scene: dict[str, Any]
@@ -159,6 +162,7 @@ def _plan_document(
             for each in layouts
         ],
         "weights": table.weights,
+        "largest_strain": table.largest_strain,
         "inputs": {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()},
         "scene": scene,
     }

@@ -16,6 +16,7 @@ from typing import Any
 
 from cmpdesign.data.schedule.processes import installed_versions, limit_threads, require_versions
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 
 CONNECT_S = 10
 RETRIES = 2  # of work that raised an error, as file systems of clusters do at times
@@ -36,7 +37,8 @@ def cluster_results(
         CmpDesignError: the scheduler cannot be reached or went away, a worker has other versions or was lost too
             often; or of the work.
     """
-    distributed: Any = import_module("distributed")
+    with extra("dask"):
+        distributed: Any = import_module("distributed")
     done = 0
     try:
         with _quiet(), _client(address) as client:
@@ -80,7 +82,8 @@ def _client(address: str) -> Any:
     Raises:
         CmpDesignError: the scheduler cannot be reached.
     """
-    distributed: Any = import_module("distributed")
+    with extra("dask"):
+        distributed: Any = import_module("distributed")
     is_file = address.endswith(".json")
     if is_file and not Path(address).is_file():
         raise CmpDesignError(f"{address}: no such scheduler file; start the scheduler first")
@@ -95,7 +98,8 @@ def _client(address: str) -> Any:
 
 def _thread_plugin() -> Any:
     """A plugin that limits the threads of all workers, also of those that join later."""
-    distributed: Any = import_module("distributed")
+    with extra("dask"):
+        distributed: Any = import_module("distributed")
 
     class Threads(distributed.WorkerPlugin):  # type: ignore[misc]
         def setup(self, worker: Any) -> None:

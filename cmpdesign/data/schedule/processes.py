@@ -1,46 +1,52 @@
-"""What a process does before it makes shards, and what it must have in common with the process that sends them."""
+"""Worker processes: one thread each, and the same versions as the process that sends the work."""
 
 from __future__ import annotations
 
-import os
-import signal
-import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.metadata import version
+from typing import Any
 
 from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.libraries import extra
 
 # Packages whose results are in a shard's bytes.
 PACKAGES = ("numpy", "scipy", "opencv-contrib-python-headless", "pyarrow")
 
 
-def start_local_worker() -> None:
-    """Make this process a worker of its parent: one thread, no Ctrl-C of its own, and an end with the parent's.
-
-    Ctrl-C reaches all processes of a terminal; the parent ends the run.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    limit_threads()
-
-
-def _end_with_parent() -> None:
-    from multiprocessing import parent_process
-
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)  # whatever the main thread does; files that are not complete have no name
-
-
 def limit_threads() -> None:
     """Let OpenCV and the libraries of linear algebra use one thread: processes share the cores."""
     import cv2
-    from threadpoolctl import threadpool_limits
+
+    with extra("data"):
+        from threadpoolctl import threadpool_limits
 
     cv2.setNumThreads(1)
     threadpool_limits(1)
+
+
+def work_on_one_thread(work: Callable[[Any], Any], item: Any) -> Any:
+    """The result of a worker process."""
+    limit_threads()
+    return work(item)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Within this context, threads are limited as in a worker."""
+    import cv2
+
+    with extra("data"):
+        from threadpoolctl import threadpool_limits
+
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        cv2.setNumThreads(before)
 
 
 def installed_versions() -> dict[str, str]:

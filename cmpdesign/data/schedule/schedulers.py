@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from cmpdesign.data.schedule.cluster import cluster_results
-from cmpdesign.data.schedule.processes import start_local_worker
+from cmpdesign.data.schedule.processes import one_thread, work_on_one_thread
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.workers import worker_pool
 
 MOST_LOSSES = 3  # of workers, one after another without a result in between
 DASK = "dask="
@@ -74,7 +75,16 @@ def results(work: Work, items: Sequence[Any], scheduler: Scheduler) -> Generator
     """
     if scheduler.address:
         return cluster_results(work, items, scheduler.address)
+    if min(scheduler.workers, len(items)) < 2:
+        return _own_results(work, items)
     return _local_results(work, items, scheduler.workers)
+
+
+def _own_results(work: Work, items: Sequence[Any]) -> Generator[Any, None, None]:
+    """The work of one worker is done by this process."""
+    with one_thread():
+        for item in items:
+            yield work(item)
 
 
 def _local_results(work: Work, items: Sequence[Any], workers: int) -> Generator[Any, None, None]:
@@ -98,24 +108,14 @@ def _pool_results(
     work: Work, items: Sequence[Any], places: Iterable[int], workers: int
 ) -> Generator[tuple[int, Any], None, None]:
     """(place, result) in the order of completion, until a worker is killed."""
-    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures import as_completed
     from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import active_children, get_context
 
-    others = set(active_children())
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=start_local_worker) as pool:
-        try:
-            futures = {pool.submit(work, items[place]): place for place in places}
+    try:
+        with worker_pool(workers) as pool:
+            futures = {pool.submit(work_on_one_thread, work, items[place]): place for place in places}
             for done in as_completed(futures):
                 if not isinstance(done.exception(), BrokenProcessPool):
                     yield futures[done], done.result()
-        except BrokenProcessPool:
-            return
-        except BaseException:  # parts in work would take minutes, and are made anew
-            pool.shutdown(wait=False, cancel_futures=True)
-            mine = set(active_children()) - others
-            for process in mine:
-                process.kill()
-            for process in mine:  # until then, they hold the locks of their files
-                process.join()
-            raise
+    except BrokenProcessPool:  # while work was submitted
+        return

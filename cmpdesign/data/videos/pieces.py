@@ -10,25 +10,29 @@ import bisect
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cmpdesign.inputs.sources import SourceError
+from cmpdesign.libraries import extra
 
 START = -(1 << 62)  # of the first piece
 END = 1 << 62  # of the last piece
-STAMPED_PACKETS = 8  # of which all have a time stamp, where the file has any
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a source: frames from ``first`` on; ``start`` and ``end`` are time stamps of a video, else 0."""
+    """A part of a source: frames from ``first`` on; ``start`` and ``end`` are time stamps of a video that has some."""
 
     first: int
     frames: int
     start: int = 0
     end: int = 0
+
+    @property
+    def has_stamps(self) -> bool:
+        return self.end > self.start
 
 
 class _Decoded(NamedTuple):
@@ -66,7 +70,7 @@ def video_pieces(path: Path, most_frames: int) -> list[Piece]:
                 keys.append(packet.pts)
         else:
             return _cut(sorted(stamps), sorted(keys), most_frames)
-    return [Piece(0, sum(1 for _ in _unstamped_frames(path)), START, END)]
+    return [Piece(0, sum(1 for _ in _unstamped_frames(path)))]
 
 
 def _cut(stamps: list[int], keys: list[int], most_frames: int) -> list[Piece]:
@@ -94,14 +98,9 @@ def piece_frames(path: Path, piece: Piece) -> Iterator[VideoFrame]:
     Raises:
         SourceError: the file cannot be opened.
     """
-    found = _stamped_frames(path, piece) if _has_stamps(path) else _unstamped_frames(path)
+    found = _stamped_frames(path, piece) if piece.has_stamps else _unstamped_frames(path)
     for place, (stamp_s, image) in enumerate(found):
         yield VideoFrame(piece.first + place, stamp_s, image)
-
-
-def _has_stamps(path: Path) -> bool:
-    with _opened(path) as container:
-        return all(packet.pts is not None for packet in islice(_packets(container), STAMPED_PACKETS))
 
 
 def _stamped_frames(path: Path, piece: Piece) -> Iterator[_Decoded]:
@@ -111,7 +110,7 @@ def _stamped_frames(path: Path, piece: Piece) -> Iterator[_Decoded]:
             _seek(container, stream, piece.start)
         waiting: list[int] = []  # stamps whose frame has not come yet
         for packet in chain(_packets(container), [None]):  # None: the last frames that the decoder holds
-            if packet is not None and piece.start <= packet.pts < piece.end:
+            if packet is not None and packet.pts is not None and piece.start <= packet.pts < piece.end:
                 bisect.insort(waiting, packet.pts)
             for frame in _decoded(stream, packet):
                 while waiting and waiting[0] < frame.pts:
@@ -138,7 +137,8 @@ def _unstamped_frames(path: Path) -> Iterator[_Decoded]:
 
 def _seek(container: Any, stream: Any, start: int) -> None:
     """Go to the key frame of a stamp, or before it; to the beginning of a file that cannot be sought in."""
-    import av
+    with extra("data"):
+        import av
 
     try:
         container.seek(start, stream=stream, backward=True)
@@ -151,7 +151,8 @@ def _seek(container: Any, stream: Any, start: int) -> None:
 
 def _packets(container: Any) -> Iterator[Any]:
     """The packets with frames that are shown, up to where the file is damaged."""
-    import av
+    with extra("data"):
+        import av
 
     with suppress(av.FFmpegError):
         for packet in container.demux(container.streams.video[0]):
@@ -161,7 +162,8 @@ def _packets(container: Any) -> Iterator[Any]:
 
 def _decoded(stream: Any, packet: Any) -> list[Any]:
     """The frames that a packet completes; none of a damaged packet."""
-    import av
+    with extra("data"):
+        import av
 
     try:
         frames = stream.codec_context.decode(packet)
@@ -177,7 +179,8 @@ def _seconds(stream: Any, stamp: int) -> float:
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     """A container with one video, decoded by one thread: the processes share the cores."""
-    import av
+    with extra("data"):
+        import av
 
     try:
         container = av.open(str(path))

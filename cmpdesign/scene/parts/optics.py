@@ -84,5 +84,7 @@ def cubic_spline(x: NDArray[np.float64]) -> NDArray[np.float64]:
 def box_gaussian(x: NDArray[np.float64], blur_px: float) -> NDArray[np.float64]:
     """The exact point spread along one axis: a unit box convolved with a Gaussian of sigma ``blur_px``."""
     root = math.sqrt(2) * blur_px
-    shares = [0.5 * (math.erf((place + 0.5) / root) - math.erf((place - 0.5) / root)) for place in x.tolist()]
-    return np.array(shares)
+    return np.asarray(0.5 * (_ERF((x + 0.5) / root) - _ERF((x - 0.5) / root)))
+
+
+_ERF = np.vectorize(math.erf, otypes=[np.float64])

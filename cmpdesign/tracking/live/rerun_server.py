@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.tracking.live.options import HOST
 from cmpdesign.tracking.recording.frames import RecordedFrame
-from cmpdesign.tracking.recording.rerun_log import APPLICATION, RerunLog, require_rerun
+from cmpdesign.tracking.recording.rerun_rows import APPLICATION, RerunRows, require_rerun
 
 MEMORY = "128MiB"  # of frames for viewers that come later; then the oldest are left out
 CLOSE_S = 0.5  # time for viewers to take the last frames
@@ -34,7 +34,7 @@ class RerunServer:
             self._stream.set_sinks(sink)
         except RuntimeError as error:
             raise CmpDesignError(f"--live-port {port}: cannot be opened ({error})") from None
-        self._log = RerunLog(self._stream, frame_id)
+        self._rows = RerunRows(frame_id)
         self.address = f"rerun+http://{HOST}:{port}/proxy"
 
     def wait(self, seconds: float) -> bool:
@@ -42,7 +42,8 @@ class RerunServer:
         return True
 
     def send(self, frames: Sequence[RecordedFrame]) -> None:
-        self._log.add(frames)
+        for one in self._rows.of(frames):
+            self._stream.send_columns(one.entity, one.timelines, one.columns, strict=True)
 
     def is_behind(self) -> bool:
         """Not known: a viewer takes what the server's memory still holds."""

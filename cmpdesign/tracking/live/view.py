@@ -147,7 +147,7 @@ def open_view(live: Live, table: FrameTable, recording: Recording) -> LiveView:
         server = FoxgloveServer(recording.frame_id, live.free_port(), places)
     else:
         from cmpdesign.tracking.live.rerun_server import RerunServer
-        from cmpdesign.tracking.recording.rerun_log import require_rerun
+        from cmpdesign.tracking.recording.rerun_rows import require_rerun
 
         require_rerun()
         server = RerunServer(recording.frame_id, live.free_port())

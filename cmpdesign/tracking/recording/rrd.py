@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from cmpdesign.files.atomic import staged_file
+from cmpdesign.libraries import extra
 from cmpdesign.tracking.columns import Columns
 from cmpdesign.tracking.recording.frames import FrameReader, RecordedFrame
 from cmpdesign.tracking.recording.images import kept_image
-from cmpdesign.tracking.recording.rerun_log import APPLICATION, RerunLog, require_rerun
+from cmpdesign.tracking.recording.rerun_rows import APPLICATION, RerunRows
 
 IMAGES_AT_ONCE = 16  # frames that are in memory together with their images
 
@@ -42,43 +43,34 @@ def write_rrd(chunks: Iterable[Columns], about: Columns, path: Path, images: Pat
 
 
 def _write_file(path: Path, frames: Iterable[RecordedFrame], frame_id: str) -> None:
-    stream, log = None, None
+    with extra("rerun", "write .mcap"):
+        from rerun.chunk import LazyChunkStream
+
+    groups = iter(_in_groups(frames))
+    first = next(groups)
+    stream = LazyChunkStream.from_iter(_chunks(chain([first], groups), frame_id))
     try:
-        for some in _in_groups(frames):
-            if stream is None or log is None:
-                stream = _open_stream(path, some, frame_id)
-                log = RerunLog(stream, frame_id)
-            log.add(some)
-        if stream is not None:
-            stream.flush()
-    except RuntimeError as error:  # Rerun's, of a thread that writes
-        raise OSError(0, f"it does not fit on the disk, or the disk fails; Rerun says: {error}") from None
-    finally:
-        if stream is not None:
-            stream.disconnect()
-    _require_whole(path)
+        stream.write_rrd(path, application_id=APPLICATION, recording_id=_identifier(first, frame_id))
+    except (RuntimeError, ValueError) as error:  # Rerun's, of a file that it cannot write
+        raise OSError(0, f"Rerun says: {error}") from None
 
 
-def _open_stream(path: Path, first: Iterable[RecordedFrame], frame_id: str) -> Any:
-    """A stream into a file, with an identifier that depends on the first frames alone."""
+def _chunks(groups: Iterable[Sequence[RecordedFrame]], frame_id: str) -> Iterator[Any]:
+    with extra("rerun"):
+        from rerun.chunk import Chunk
+
+    rows = RerunRows(frame_id)
+    for frames in groups:
+        for one in rows.of(frames):
+            yield Chunk.from_columns(one.entity, one.timelines, one.columns)
+
+
+def _identifier(first: Iterable[RecordedFrame], frame_id: str) -> str:
+    """The recording's identifier, by its first frames."""
     digest = hashlib.sha256(frame_id.encode())
     for frame in first:
         digest.update(frame.ns.to_bytes(8, "little") + frame.markers.tobytes())
-    stream = require_rerun().RecordingStream(
-        APPLICATION, recording_id=digest.hexdigest()[:32], send_properties=False
-    )
-    stream.save(path)
-    return stream
-
-
-def _require_whole(path: Path) -> None:
-    """Check that the file has its end: Rerun reports no failure of its last write."""
-    from rerun.chunk import RrdReader
-
-    try:
-        RrdReader(path).store()
-    except (RuntimeError, ValueError) as error:
-        raise OSError(0, f"its end is missing; does it fit on the disk? Rerun says: {error}") from None
+    return digest.hexdigest()[:32]
 
 
 def _in_groups(frames: Iterable[RecordedFrame]) -> Iterable[list[RecordedFrame]]:

@@ -117,6 +117,8 @@ def _recover_chunks(part: Path, path: Path) -> Recovered:
 
 
 def _require_kind(path: Path) -> None:
+    if not path.name:
+        raise CmpDesignError(f"{path}: is a folder; give a file's name, or that of a new folder")
     if path.suffix not in (*KINDS, ""):
         raise CmpDesignError(
             f"{path}: unknown ending; expected one of {', '.join(KINDS)}, or none for a rosbag2 folder"
@@ -124,7 +126,7 @@ def _require_kind(path: Path) -> None:
     if path.suffix == ".parquet":
         require_pyarrow()
     if path.suffix == ".rrd":
-        from cmpdesign.tracking.recording.rerun_log import require_rerun
+        from cmpdesign.tracking.recording.rerun_rows import require_rerun
 
         require_rerun()
     elif is_recording(path):

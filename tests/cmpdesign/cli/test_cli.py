@@ -102,7 +102,7 @@ def test_a_clip_that_leaves_too_few_cells_is_an_error(tmp_path: Path) -> None:
 
 
 def test_check() -> None:
-    assert "nothing to report" in run("check", "tac3d").stdout
+    assert "no findings" in run("check", "tac3d").stdout
     result = run("check", "honeycomb", "--set", "pitch_mm=0.1")
     assert result.exit_code == 1
     assert "smallest cell" in result.stdout and "mm" in result.stdout
@@ -127,6 +127,7 @@ def test_version_and_help() -> None:
     for command in ("templates", "build", "check", "render", "verify", "schema"):
         assert command in run("--help").stdout
         assert run(command, "--help").exit_code == 0
+    assert run("evaluate").stderr.strip() == run("evaluate", "--help").stdout.strip()
     shown = re.sub(r"\s+", " ", run("render", "--help").stdout)
     assert f"scene template: {', '.join(scene_templates())}." in shown
 
@@ -143,6 +144,7 @@ def test_version_and_help() -> None:
         (("build", "honeycomb", "--set", "layers"), "expected NAME=VALUE"),
         (("build", "honeycomb", "--only", "pdf"), "--only pdf: unknown; there are svg"),
         (("build", "honeycomb", "--only", ","), "names no file"),
+        (("init", "."), "is a folder; give a design's name"),
         (("check", "honeycomb", "--camera", "640"), "expected WIDTHxHEIGHT"),
         (("render", "none.json", "-o", "image.png"), "none.json: cannot be read: No such file"),
         (("verify", "none.json", "image.png"), "none.json: cannot be read: No such file"),

@@ -29,6 +29,7 @@ CODECS = {
         {"crf": "0", "g": "5", "bf": "2", "x264-params": "open-gop=1:scenecut=0:b-adapt=0"},
     ),
     "closed groups.mkv": Codec("libx264", "yuv420p", {"crf": "10", "g": "7", "bf": "2"}),
+    "raw.h264": Codec("libx264", "yuv444p", {"crf": "0", "g": "5", "bf": "2"}),
     "motion jpeg.avi": Codec("mjpeg", "yuvj420p", {}),
 }
 
@@ -51,7 +52,7 @@ def number_of(image: np.ndarray) -> int:
     return round((float(image.mean()) - 2.5) / 10)
 
 
-@pytest.mark.parametrize("name", CODECS)
+@pytest.mark.parametrize("name", [name for name in CODECS if not name.startswith("raw")])
 def test_every_frame_is_in_one_part_under_its_number(name: str, tmp_path: Path) -> None:
     path = write_numbered(tmp_path / name)
     pieces = video_pieces(path, 4)
@@ -63,6 +64,16 @@ def test_every_frame_is_in_one_part_under_its_number(name: str, tmp_path: Path) 
     for number, whole in enumerate(open_source(str(path)).frames()):
         assert abs(times[number] - whole.time_s) < 2e-3
     assert number == FRAMES - 1
+
+
+def test_a_file_without_time_stamps_is_one_part(tmp_path: Path) -> None:
+    """Its frames come in their order, at the times of the file's frame rate."""
+    path = write_numbered(tmp_path / "raw.h264")
+    (piece,) = video_pieces(path, 4)
+    found = list(piece_frames(path, piece))
+    assert (piece.first, piece.frames, piece.has_stamps) == (0, FRAMES, False)
+    assert [frame.number for frame in found] == [number_of(frame.image) for frame in found]
+    assert [frame.time_s for frame in found] == pytest.approx([number / 25 for number in range(FRAMES)])
 
 
 def test_a_damaged_part_costs_its_frames_only(tmp_path: Path) -> None:

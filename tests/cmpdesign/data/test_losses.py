@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.datasets import contents, make_serially, write_plan
+from tests.support.made.datasets import contents, make_serially, write_plan
 
 ROOT = Path(__file__).parents[3]
 PROGRAM = "from cmpdesign.cli import main; main()"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import resource
 import shutil
 import tarfile
@@ -16,15 +17,16 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from cmpdesign import OutputError
+from cmpdesign import CmpDesignError, InputError, OutputError
 from cmpdesign.data import load
 from cmpdesign.data.folder import write_manifest
+from cmpdesign.data.schedule.processes import installed_versions, require_versions
 from cmpdesign.data.shard import make_shard
 from cmpdesign.reading.read_layout import layout_from_reference
 from cmpdesign.scene import render
 from cmpdesign.scene.files.scene_file import scene_from_document
 from tests.support.command import refused, run
-from tests.support.datasets import contents, make_serially, write_plan
+from tests.support.made.datasets import contents, make_serially, write_plan
 
 
 @pytest.fixture(scope="module")
@@ -123,6 +125,51 @@ def test_jpeg_keeps_the_resolution_of_color(tmp_path: Path) -> None:
     assert np.isfinite(load(folder)[0].arrays["xy_px"]).mean() > 0.8
 
 
+VIEWS = """
+[[scene.view]]
+distance_mm = 40
+field_of_view_deg = 30
+tilt_deg = {tilt}
+back = true
+area_px = [{x}, 0, 200, 180]
+"""
+
+
+def test_two_views_in_one_picture_are_read_each(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path, frames=1, frames_a_shard=1)
+    text = plan.read_text(encoding="utf-8").replace("[200, 180]", "[400, 180]")
+    text = re.sub(r"\[scene.camera\]\n.*\n", "", text)
+    views = "".join(VIEWS.format(tilt=tilt, x=x) for tilt, x in ((15, 0), (-15, 200)))
+    plan.write_text(text + views, encoding="utf-8")
+    (frame,) = load(make_serially(plan, tmp_path / "data"))
+    assert frame.values["views"] == 2 and frame.image.shape == (180, 400, 3)
+    assert {name: values.shape for name, values in frame.arrays.items()} == {
+        "rest_xy_px": (2, 37, 2),
+        "true_xy_px": (2, 37, 2),
+        "visible": (2, 37),
+        "true_xyz_mm": (37, 3),
+        "xy_px": (2, 37, 2),
+        "cov_px2": (2, 37, 3),
+        "status": (2, 37),
+    }
+    error_px = frame.arrays["xy_px"] - frame.arrays["true_xy_px"]
+    assert frame.values["reason"] == ["", ""] and np.nanmax(np.abs(error_px)) < 0.5
+    assert (frame.arrays["xy_px"][0, :, 0] < 200).all() and (frame.arrays["xy_px"][1, :, 0] > 200).all()
+
+
+def test_contacts_beyond_the_strain_are_drawn_anew(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path, frames=2)
+    text = plan.read_text(encoding="utf-8")
+    plan.write_text(text.replace("frames = 2", "largest_strain = 0.06\nframes = 2", 1), encoding="utf-8")
+    frames = load(make_serially(plan, tmp_path / "data"))
+    assert all(frame.values["largest_strain"] <= 0.06 for frame in frames)
+    assert sum(frame.values["redrawn"] for frame in frames) > 0
+    plan.write_text(text.replace("frames = 2", "largest_strain = 1e-6\nframes = 2", 1), encoding="utf-8")
+    line = refused("dataset", plan, "-o", tmp_path / "none", "--workers", 1)
+    assert "frame 0: none of 20 draws can be rendered" in line and "the plan's limit 1e-06" in line
+    assert "narrow the plan's ranges" in line and not list((tmp_path / "none").glob("*/0*"))
+
+
 def test_places_and_iteration_agree(made: Path) -> None:
     frames = load(made)
     assert len(frames) == 4 and frames.complete and frames.shards == (0, 1)
@@ -210,3 +257,28 @@ def test_a_changed_plan_is_noticed(made: Path, tmp_path: Path) -> None:
     plan = folder / "plan.json"
     plan.write_text(plan.read_text(encoding="utf-8").replace('"seed": 0', '"seed": 1'), encoding="utf-8")
     assert "plan.json: was changed" in refused("dataset", write_plan(tmp_path), "-o", folder)
+
+
+def test_damage_is_told_with_what_helps(made: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    shutil.copytree(made, folder)
+    (folder / "tables" / "000001.parquet").write_bytes(b"no table")
+    with pytest.raises(InputError, match=r"000001.parquet: cannot be read \(.*make the shard again"):
+        load(folder)[2]
+    (folder / "images" / "000000.tar").write_bytes(b"no tar" * 200)
+    with pytest.raises(InputError, match=r"000000.tar: is no tar file"):
+        load(folder)[0]
+    for text in ("{}", "[1]", "no JSON", '{"plan": "other", "shards": [{"shard": "../../x"}]}'):
+        (folder / "manifest.json").write_text(text, encoding="utf-8")
+        assert load(folder).shards == ()
+    shutil.copy(made / "manifest.json", folder)
+    assert load(folder).shards == (0, 1)
+    with pytest.raises(CmpDesignError, match=r"holds no plan.json; give the folder of cmpdesign dataset"):
+        load(tmp_path)
+
+
+def test_a_worker_with_other_versions_is_refused() -> None:
+    versions = installed_versions()
+    require_versions(versions)
+    with pytest.raises(CmpDesignError, match=r"a worker has numpy .*, this program 0\.1; install the same"):
+        require_versions(versions | {"numpy": "0.1"})

@@ -163,7 +163,7 @@ def test_ranges_and_units_are_those_of_the_model() -> None:
 
 def test_init_keeps_what_is_there(tmp_path: Path) -> None:
     path = written(tmp_path / "mine.toml", "# by hand\n")
-    assert "is there already" in refused("init", path)
+    assert "exists already" in refused("init", path)
     assert "no template" in refused("init", tmp_path / "other", "--extends", "nosuch")
     assert "extends itself" in refused("init", path, "--extends", "mine.toml", "--force")
     assert path.read_text(encoding="utf-8") == "# by hand\n" and list(tmp_path.iterdir()) == [path]

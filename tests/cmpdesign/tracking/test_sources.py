@@ -71,14 +71,17 @@ def test_a_damaged_folder_keeps_every_frame_in_its_place(made: Path, tmp_path: P
 class StoppingCamera:
     """Stands for OpenCV's reader of a camera that is unplugged after some frames."""
 
-    def __init__(self, folder: Path, frames: int) -> None:
+    def __init__(self, folder: Path, frames: int, stamps_ms: list[float] | None = None) -> None:
         self.paths = [folder / f"frame{i}.png" for i in range(frames)]
+        self.stamps_ms = stamps_ms or []
         self.released = False
 
     def isOpened(self) -> bool:
         return True
 
     def get(self, key: int) -> float:
+        if key == cv2.CAP_PROP_POS_MSEC:
+            return self.stamps_ms.pop(0) if self.stamps_ms else 0.0  # as of a driver without stamps
         return {cv2.CAP_PROP_FRAME_WIDTH: 320, cv2.CAP_PROP_FRAME_HEIGHT: 240}[key]
 
     def read(self) -> tuple[bool, Any]:
@@ -99,6 +102,15 @@ def test_a_camera_that_stops(made: Path, tmp_path: Path, monkeypatch: pytest.Mon
     assert (table["frame_status"] == [1] * 8 + [3] * (len(table["frame"]) - 8)).all()
     assert table["time_s"][0] == 0 and (np.diff(table["time_s"]) >= 0).all()
     assert camera.released
+
+
+def test_a_cameras_own_time_stamps(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a clock of its own; a stamp that does not go on, or is long before the arrival, does not count."""
+    stamps_ms = [7e6, 7e6 + 40, 7e6 + 80, 7e6 + 80, 5.0, 7e6 + 210]
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: StoppingCamera(made / "frames", 6, stamps_ms))
+    monkeypatch.setattr("time.monotonic", iter([100 + 0.05 * k for k in range(40)]).__next__)
+    times = [frame.time_s for frame in open_source("0").frames() if frame.image is not None]
+    np.testing.assert_allclose(times, [0, 0.04, 0.08, 0.15, 0.2, 0.21], atol=1e-6)
 
 
 def test_a_camera_that_is_not_there(made: Path, tmp_path: Path) -> None:

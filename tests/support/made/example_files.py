@@ -17,6 +17,7 @@ from cmpdesign.products.laser.setup import complete_setup
 from tests.support.command import run
 from tests.support.laser_tools import coupon_photo
 from tests.support.layouts import small_text
+from tests.support.made.datasets import write_plan
 from tests.support.made.rest_pictures import nominal_layout, write_rest_images
 from tests.support.tracking.press import write_press
 from tests.support.tracking.scenes import LAYERS, moving
@@ -40,9 +41,11 @@ def prepare_files(folder: Path, command: str) -> Path:
             write_rest_images(folder / "rest")
         case "kerf":
             _write_coupon(folder)
+        case "dataset":
+            write_plan(folder, frames=2)
         case "render":
             (folder / "layout.json").write_text(small_text("honeycomb", LAYERS), encoding="utf-8")
-        case "verify" | "track" | "export":
+        case "verify" | "track" | "extract" | "export":
             _write_moving(folder)
     if command == "export":
         for name in ("run1.npz", "run2.npz"):

@@ -44,6 +44,7 @@ def open_client(port: int, timeout_s: float = 30) -> ClientConnection:
                 subprotocols=[SUBPROTOCOL],
                 max_size=None,
                 close_timeout=1,
+                ping_interval=None,
                 max_queue=1,
                 compression=None,
                 legacy=True,

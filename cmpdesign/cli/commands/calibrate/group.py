@@ -12,7 +12,7 @@ app = typer.Typer(
     epilog=examples(*pattern.EXAMPLES),
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Measure what one sensor is like, from its pictures.",
+    help="Measure the properties of one sensor from its pictures.",
 )
 
 

@@ -11,7 +11,7 @@ from cmpdesign.cli.options.images import MaxPixelsOption, PresetOption
 from cmpdesign.cli.options.paths import require_suffix
 from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.progress import working
-from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def pattern(
         learnt = calibrate_pattern(
             layout, images, output, preset=preset, response=known, max_pixels=max_pixels
         )
+    print_step(f"{len(learnt.picture_z)} pictures are read, the markers' places are fitted")
     _print_figures(learnt)
     say(f"wrote {printable_path(output)}")
     finish(lambda: CalibratePatternDocument(written=printable_path(output), **_figures(learnt)))

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cmpdesign.cli.commands.data.progress import print_made, shards_bar
+from cmpdesign.cli.commands.data.made import print_made
 from cmpdesign.cli.options.scheduling import SchedulerOption, WorkersOption
+from cmpdesign.cli.progress import working
 
 EXAMPLES = (
-    "cmpdesign dataset plan.toml -o pressed --workers 2",
-    "cmpdesign dataset plan.toml -o pressed --shards 1 --json",
+    "cmpdesign dataset plan.toml -o pressed",
+    "cmpdesign dataset plan.toml -o pressed --shards 1 --workers 1 --json",
 )
 
 
@@ -52,8 +52,9 @@ def dataset(
     from cmpdesign.data.run import make_dataset, parse_shards
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.design.templates import find_plan
+    from cmpdesign.watch import watched
 
     wanted, where = parse_shards(shards), parse_scheduler(scheduler, workers)
-    with ExitStack() as stack:
-        made = make_dataset(find_plan(plan), output, wanted, where, shards_bar(stack))
+    with working("making") as steps, watched(steps.tell):
+        made = make_dataset(find_plan(plan), output, wanted, where)
     print_made(output, made)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cmpdesign.cli.commands.data.progress import print_made, shards_bar
+from cmpdesign.cli.commands.data.made import print_made
 from cmpdesign.cli.options.images import ChannelsOption, PresetOption, SideOption
 from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
 from cmpdesign.cli.options.scheduling import SchedulerOption, WorkersOption
+from cmpdesign.cli.progress import working
 
 EXAMPLES = (
-    "cmpdesign extract layout.json press.mp4 frames -o markers --workers 1",
-    "cmpdesign extract layout.json press.mp4 -o markers --frames-a-shard 100 --workers 1 --json",
+    "cmpdesign extract layout.json press.mp4 -o markers",
+    "cmpdesign extract layout.json press.mp4 frames -o markers --frames-a-shard 100 --workers 1 --json",
 )
 
 
@@ -50,10 +50,11 @@ def extract(
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.data.videos.extraction import Reading
+    from cmpdesign.watch import watched
     from extractor import load_layout
 
     reading = Reading(preset, parse_reading_response(response), side, channels)
     where, reference = parse_scheduler(scheduler, workers), load_layout(layout)
-    with ExitStack() as stack:
-        made = extract_markers(reference, sources, output, reading, where, shards_bar(stack), frames_a_shard)
+    with working("extracting") as steps, watched(steps.tell):
+        made = extract_markers(reference, sources, output, reading, where, frames_a_shard)
     print_made(output, made)

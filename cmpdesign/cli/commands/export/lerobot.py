@@ -26,7 +26,7 @@ def lerobot(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Data set to write; a new folder.")
     ],
-    task: Annotated[str, typer.Option(help="What the runs show, in words.")] = "contact",
+    task: Annotated[str, typer.Option(help="Task that the runs show, in words.")] = "contact",
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: as the runs' times say]")
     ] = None,

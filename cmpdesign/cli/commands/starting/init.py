@@ -32,7 +32,7 @@ def init(
 ) -> None:
     """Write a commented design file.
 
-    Every field stands in it with its meaning, unit, range and default; build takes the file.
+    The file holds every field with its meaning, unit, range and default. The command build takes the file.
     """
     from cmpdesign.cli.documents.designs import InitDocument
     from cmpdesign.design.commented_toml import commented_toml
@@ -41,9 +41,11 @@ def init(
     from cmpdesign.files.atomic import write_file
     from cmpdesign.inputs.files import path_exists
 
+    if not name.name:
+        raise CmpDesignError(f"{name}: is a folder; give a design's name")
     path = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
     if path_exists(path) and not force:
-        raise CmpDesignError(f"{path}: is there already; choose another name, or replace it with --force")
+        raise CmpDesignError(f"{path}: exists already; choose another name, or replace it with --force")
     if extends is not None:
         require_extended(extends, path)
     write_file(path, commented_toml(extends))

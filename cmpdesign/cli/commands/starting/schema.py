@@ -22,7 +22,7 @@ def schema(
 ) -> None:
     """Print a JSON Schema.
 
-    That of a design's TOML file, for editors, or that of what COMMAND prints with --json.
+    The schema of a design's TOML file, for editors, or of the document that COMMAND prints with --json.
     """
     if not command:
         from cmpdesign.design.design import design_schema_text

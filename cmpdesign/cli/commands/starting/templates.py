@@ -46,7 +46,7 @@ def templates(
         ),
     ] = None,
 ) -> None:
-    """List or show what is shipped.
+    """List or show the templates.
 
     Templates are designs, scenes, plans of data sets, machines, materials, silicones and sensors.
     """

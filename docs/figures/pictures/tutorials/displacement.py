@@ -52,9 +52,9 @@ def _arrows(reference: Reference, shape: Shape) -> Picture:
     with plt.rc_context({"font.family": "DejaVu Sans", "font.size": 8}):
         figure, axes = plt.subplots(figsize=(4.8, 3.4), dpi=DOTS_PER_INCH)
         colors = axes.tricontourf(
-            x, y, dz, levels=np.arange(-0.32, 0.09, 0.04), cmap="viridis", extend="both"
+            x, y, dz, levels=np.arange(-0.34, 0.07, 0.04), cmap="viridis", extend="both"
         )
-        axes.quiver(x, y, dx, dy, angles="xy", scale_units="xy", scale=0.2, width=0.004, color="white")
+        axes.quiver(x, y, dx, dy, angles="xy", scale_units="xy", scale=0.2, width=0.004, color="black")
         axes.set(aspect="equal", xlabel="x, mm", ylabel="y, mm")
         figure.colorbar(colors, ax=axes, label="displacement in z, mm")
         figure.tight_layout(pad=0.4)

@@ -10,7 +10,7 @@ from cmpdesign.layout.build import build_layout
 from cmpdesign.products.laser.coupon.design import design_coupon
 from cmpdesign.products.laser.setup import complete_setup
 from cmpdesign.products.sheet.print_sheet import make_print_sheet
-from cmpdesign.scene import Camera, Optics, Scene
+from cmpdesign.scene import Camera, Optics, Scene, Sensor
 from extractor import Extractor, parse_layout
 from extractor.draw import draw_markers
 
@@ -30,6 +30,7 @@ from .page_files import (
 )
 
 QUICK_PX = (640, 480)
+VIEW_PX_MM = 16.7  # of the sensor tac3d
 TWO_PX, THREE_PX = (236, 177), (168, 126)
 
 
@@ -40,6 +41,7 @@ def figures() -> dict[str, bytes]:
         **_laser_pad("laser-pad"),
         **_cast_pad("cast-pad"),
         **displacement.figures("sensor"),
+        **_compare_designs("compare-designs"),
     }
 
 
@@ -92,3 +94,16 @@ def _cast_pad(page: str) -> dict[str, bytes]:
         "tutorial-casting.svg": casting().text_of().encode(),
         "tutorial-cast-failures.jpg": to_jpeg(mosaic([pads], THREE_PX)),
     }
+
+
+def _compare_designs(page: str) -> dict[str, bytes]:
+    parts = []
+    for name in ("coarse", "middle", "finest"):
+        layout = page_layout(page, f"{name}.toml")
+        camera = Camera(VIEW_PX_MM * float(layout.parameters["pitch_mm"]), rotation_deg=9.0)
+        scene = Scene(layout, camera, optics=Optics(1.2), sensor=Sensor(noise=2.0))
+        small = cropped(scene_picture(scene, (320, 240)), (104, 78, 216, 162))
+        parts.append(
+            np.asarray(cv2.resize(small, None, fx=3, fy=3, interpolation=cv2.INTER_NEAREST), np.uint8)
+        )
+    return {"tutorial-candidates.jpg": to_jpeg(mosaic([parts], THREE_PX))}

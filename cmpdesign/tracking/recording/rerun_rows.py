@@ -1,10 +1,10 @@
-"""Frames logged to Rerun: what a recording's messages hold, as columns of Rerun's entities."""
+"""Frames as rows of Rerun: what a recording's messages hold, as columns of Rerun's entities."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,32 +44,39 @@ def require_rerun() -> Any:
     return rerun
 
 
-class RerunLog:
-    """Logs frames to a recording stream.
+class EntityRows(NamedTuple):
+    """Rows of an entity, as ``Chunk.from_columns`` and ``RecordingStream.send_columns`` take them."""
+
+    entity: str
+    timelines: list[Any]
+    columns: list[Any]
+
+
+class RerunRows:
+    """Makes rows of frames.
 
     Args:
-        stream: a ``rerun.RecordingStream``.
         frame_id: the coordinate frame of the markers, and the first part of all entities but the diagnostics'.
     """
 
-    def __init__(self, stream: Any, frame_id: str) -> None:
-        self._rerun, self._stream, self._base = require_rerun(), stream, f"/{frame_id}"
+    def __init__(self, frame_id: str) -> None:
+        self._rerun, self._base = require_rerun(), f"/{frame_id}"
 
-    def add(self, frames: Sequence[RecordedFrame]) -> None:
-        """Log F frames, at least one, of one table: a chunk of F rows an entity."""
+    def of(self, frames: Sequence[RecordedFrame]) -> Iterator[EntityRows]:
+        """The rows of F frames, at least one, of one table: F rows an entity."""
         records = np.stack([frame.markers for frame in frames])
-        self._send(f"{self._base}/markers", frames, self._markers(records))
-        self._send(f"{self._base}/displacement", frames, self._arrows(records))
-        self._send(DIAGNOSTICS_ENTITY, frames, self._diagnostics(frames))
-        self._send_images(frames)
+        yield self._rows(f"{self._base}/markers", frames, self._markers(records))
+        yield self._rows(f"{self._base}/displacement", frames, self._arrows(records))
+        yield self._rows(DIAGNOSTICS_ENTITY, frames, self._diagnostics(frames))
+        yield from self._images(frames)
 
-    def _send(self, entity: str, frames: Sequence[RecordedFrame], columns: Any) -> None:
+    def _rows(self, entity: str, frames: Sequence[RecordedFrame], columns: Iterable[Any]) -> EntityRows:
         """A row a frame, on two timelines: the frames' numbers, and the source's times."""
         column = self._rerun.TimeColumn
         numbers = np.array([frame.number for frame in frames], np.int64)
         times = np.array([frame.ns for frame in frames], "timedelta64[ns]")
         timelines = [column("frame", sequence=numbers), column("time", duration=times)]
-        self._stream.send_columns(entity, timelines, columns, strict=True)
+        return EntityRows(entity, timelines, list(columns))
 
     def _markers(self, records: Records) -> list[Any]:
         """The (F, M) markers: points in metres, colored by status, and all other fields as they are recorded."""
@@ -105,7 +112,7 @@ class RerunLog:
         values = {name: [frame.values[name] for frame in frames] for name in frames[0].values}
         return [*log, *self._own("Diagnostics", values)]
 
-    def _send_images(self, frames: Iterable[RecordedFrame]) -> None:
+    def _images(self, frames: Iterable[RecordedFrame]) -> Iterator[EntityRows]:
         """Each image, and beside it what is known of its cameras; an entity holds the frames that have it."""
         images: dict[str, list[tuple[RecordedFrame, FrameImage]]] = {}
         cameras: dict[str, list[tuple[RecordedFrame, FrameImage, CameraView]]] = {}
@@ -118,10 +125,10 @@ class RerunLog:
             columns = self._rerun.EncodedImage.columns(
                 blob=[image.png for _, image in rows], media_type=["image/png"] * len(rows)
             )
-            self._send(f"/{base}/image_raw", [frame for frame, _ in rows], columns)
+            yield self._rows(f"/{base}/image_raw", [frame for frame, _ in rows], columns)
         for base, seen in cameras.items():
             columns = self._cameras([image for _, image, _ in seen], [view for _, _, view in seen])
-            self._send(f"/{base}/camera_info", [frame for frame, _, _ in seen], columns)
+            yield self._rows(f"/{base}/camera_info", [frame for frame, _, _ in seen], columns)
 
     def _cameras(self, images: Sequence[FrameImage], views: Sequence[CameraView]) -> Any:
         """Sizes and intrinsics; a focal length of 0 stands for unknown intrinsics."""
@@ -149,7 +156,8 @@ def _joined(records: Records, fields: tuple[str, ...]) -> NDArray[np.float32]:
 
 def _fixed_lists(values: NDArray[Any]) -> Any:
     """(N, K) as N lists of K numbers."""
-    import pyarrow
+    with extra("rerun"):
+        import pyarrow
 
     return pyarrow.FixedSizeListArray.from_arrays(
         pyarrow.array(np.ascontiguousarray(values).ravel()), values.shape[1]

@@ -1,0 +1,309 @@
+"""How fast data sets are made and read, on one and on two workers, and how large they are.
+
+    python -m benchmarks.datasets [--quick] [--json FILE] [--publish]
+
+"rendered": the shipped plan pressed-objects: every frame is drawn, its contact solved, rendered, encoded as JPEG and
+read. "extracted": the same pictures as videos (FFV1, 640 x 480 px), decoded and read. Frames a second are those of the
+whole command, the start of its workers included; "efficiency" is the rate on two workers over twice that on one; core
+milliseconds a frame depend little on what else the machine does. Sizes are those of the shards' files. "start" and "a
+shard without work" are what a scheduler takes itself. The sum for 10 million frames multiplies core time and sizes; its
+prices are assumptions, stated beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.support.machine import conditions_text, machine_conditions, write_json
+from benchmarks.support.published import write_published
+from cmpdesign.data import load
+from cmpdesign.data.run import ShardRange, extract_markers, make_dataset
+from cmpdesign.data.schedule.schedulers import Scheduler
+from cmpdesign.data.schedule.schedulers import results as results_of
+from cmpdesign.data.videos.extraction import Reading
+from cmpdesign.design.templates import find_plan
+from cmpdesign.files.images import to_png
+from cmpdesign.tracking.export.video import Codec, CodecVideo
+from extractor import load_layout
+
+FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 12, 2
+VIDEOS, REPEATS = 2, 4  # every picture is in the videos several times
+EMPTY_SHARDS = 200
+MILLIONS = 10
+CORE_HOUR_USD, GB_MONTH_USD = 0.04, 0.023  # assumed: a spot core and object storage of a large provider, 2025
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Frames a second, and core milliseconds a frame, on one and on two workers."""
+
+    what: str
+    frames: int
+    one: float
+    two: float
+    ms_one: float
+    ms_two: float
+
+    @property
+    def efficiency(self) -> float:
+        return self.two / (2 * self.one)
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What work took: time, and the time of all cores, of this process and of its workers."""
+
+    seconds: float
+    core_seconds: float
+
+
+@dataclass(frozen=True)
+class Overhead:
+    """A scheduler without work: time to start, and for each shard."""
+
+    scheduler: str
+    start_s: float
+    ms_a_shard: float
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Bytes of a frame: encoded as JPEG, as PNG, and of its row in the table."""
+
+    jpeg: float
+    png: float
+    table: float
+
+
+def spent(work: Callable[[], object]) -> Spent:
+    started, before = time.perf_counter(), core_seconds()
+    work()
+    return Spent(time.perf_counter() - started, core_seconds() - before)
+
+
+def core_seconds() -> float:
+    """Of this process, and of workers that have ended."""
+    kinds = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    used = [resource.getrusage(kind) for kind in kinds]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def rates_of(what: str, frames: int, one: Spent, two: Spent) -> Rates:
+    return Rates(
+        what,
+        frames,
+        frames / one.seconds,
+        frames / two.seconds,
+        1e3 * one.core_seconds / frames,
+        1e3 * two.core_seconds / frames,
+    )
+
+
+def small_plan(folder: Path, shards: int) -> Path:
+    """The shipped plan with few frames."""
+    text = find_plan("pressed-objects").read_text(encoding="utf-8")
+    lines = [
+        f"frames = {shards * FRAMES_A_SHARD}"
+        if line.startswith("frames = ")
+        else f"frames_a_shard = {FRAMES_A_SHARD}"
+        if line.startswith("frames_a_shard = ")
+        else line
+        for line in text.splitlines()
+    ]
+    path = folder / "plan.toml"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def measure_rendering(folder: Path, shards: int) -> Rates:
+    """The plan made by one and by two workers; it is left in the folder "data1"."""
+    plan, frames = small_plan(folder, shards), shards * FRAMES_A_SHARD
+    times = [
+        spent(
+            lambda count=count: make_dataset(  # type: ignore[misc]
+                plan, folder / f"data{count}", ShardRange(), Scheduler(workers=count)
+            )
+        )
+        for count in (1, 2)
+    ]
+    if (folder / "data1/manifest.json").read_bytes() != (folder / "data2/manifest.json").read_bytes():
+        raise RuntimeError("one and two workers made different bytes")
+    return rates_of("rendered", frames, times[0], times[1])
+
+
+def write_videos(folder: Path, shards: int) -> list[str]:
+    """The pictures of the data set as videos."""
+    images = [frame.image for frame in load(folder / "data1").frames(range(min(shards, 8)))]
+    paths = [folder / f"video{number}.mkv" for number in range(VIDEOS)]
+    for path in paths:
+        video = CodecVideo(path, Codec("ffv1", "bgr0", {"g": "1"}), 30.0)
+        for image in images * REPEATS:
+            video.add(image)
+        video.close()
+    return [str(path) for path in paths]
+
+
+def measure_extraction(folder: Path, shards: int) -> Rates:
+    videos, layout = write_videos(folder, shards), load_layout(folder / "data1/layouts/tac3d.json")
+    times, frames = [], 0
+    for count in (1, 2):
+        out = folder / f"markers{count}"
+        options = (Reading(), Scheduler(workers=count), 4 * FRAMES_A_SHARD)
+        times.append(spent(lambda: extract_markers(layout, videos, out, *options)))  # noqa: B023
+        frames = len(load(out))
+    return rates_of("extracted", frames, times[0], times[1])
+
+
+def measure_sizes(folder: Path) -> Sizes:
+    frames = load(folder / "data1")
+    tables = sum(path.stat().st_size for path in (folder / "data1/tables").iterdir())
+    images = [(len(frame.image_bytes), len(to_png(frame.image))) for frame in frames.frames([0, 1])]
+    jpeg, png = (sum(sizes) / len(images) for sizes in zip(*images, strict=True))
+    return Sizes(jpeg, png, tables / len(frames))
+
+
+def do_nothing(number: int) -> int:
+    return number
+
+
+def measure_overhead(name: str, scheduler: Scheduler) -> Overhead:
+    start_s = spent(lambda: list(results_of(do_nothing, [0, 1], scheduler))).seconds
+    many_s = spent(lambda: list(results_of(do_nothing, range(EMPTY_SHARDS), scheduler))).seconds
+    return Overhead(name, start_s, max(0.0, 1e3 * (many_s - start_s) / EMPTY_SHARDS))
+
+
+def measure_overheads() -> list[Overhead]:
+    """The pool of this machine, and a dask cluster of two workers on it, whose own start is not counted."""
+    from distributed import LocalCluster
+
+    found = [measure_overhead("local, 2 workers", Scheduler(workers=2))]
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        found.append(measure_overhead("dask, 2 workers", Scheduler(cluster.scheduler_address)))
+    return found
+
+
+def rates_table(rates: Sequence[Rates]) -> Table:
+    table = Table(title="Frames a second", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    table.add_column("frames", no_wrap=True)
+    for name in ("number", "one worker", "two workers", "efficiency", "core ms a frame", "on two"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for one in rates:
+        table.add_row(one.what, f"{one.frames}", f"{one.one:.1f}", f"{one.two:.1f}", f"{one.efficiency:.2f}")
+    return table
+
+
+def other_table(results: Mapping[str, Any]) -> Table:
+    table = Table(title="Size and overhead", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    table.add_column("figure", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    sizes, paper = results["bytes"], sum_on_paper(results)
+    table.add_row("picture as JPEG 95, 4:4:4", f"{sizes['jpeg'] / 1e3:.0f} kB")
+    table.add_row("the same as PNG", f"{sizes['png'] / 1e3:.0f} kB")
+    table.add_row("row of the table", f"{sizes['table'] / 1e3:.1f} kB")
+    for row in results["overheads"]:
+        table.add_row(f"{row['scheduler']}: start", f"{row['start_s']:.1f} s")
+        table.add_row(f"{row['scheduler']}: a shard without work", f"{row['ms_a_shard']:.1f} ms")
+    table.add_row(f"{MILLIONS} million frames: hours of one core", f"{paper['hours']:.0f}")
+    table.add_row(f"{MILLIONS} million frames: JPEG and tables", f"{paper['size_gb']:.0f} GB")
+    table.add_row(f"computed at {CORE_HOUR_USD} USD a core hour", f"{paper['compute_usd']:.0f} USD")
+    table.add_row(f"kept at {GB_MONTH_USD} USD a GB and month", f"{paper['store_usd_month']:.0f} USD a month")
+    return table
+
+
+def sum_on_paper(results: Mapping[str, Any]) -> dict[str, float]:
+    """Core hours, GB and USD of 10 million frames."""
+    hours = MILLIONS * 1e6 * results["rates"][0]["ms_one"] / 3.6e6
+    size_gb = MILLIONS * 1e6 * (results["bytes"]["jpeg"] + results["bytes"]["table"]) / 1e9
+    return {
+        "hours": hours,
+        "size_gb": size_gb,
+        "compute_usd": hours * CORE_HOUR_USD,
+        "store_usd_month": size_gb * GB_MONTH_USD,
+    }
+
+
+def markdown(results: Mapping[str, Any]) -> dict[str, str]:
+    """The blocks of the page docs/how-to/datasets.md."""
+    lines = [
+        "| frames a second | one worker | two workers | efficiency | core ms a frame | on two workers |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {row['what']} | {row['one']:.1f} | {row['two']:.1f} | {row['efficiency']:.2f} |"
+        f" {row['ms_one']:.0f} | {row['ms_two']:.0f} |"
+        for row in results["rates"]
+    ]
+    sizes = {name: f"{value / 1e3:.0f} kB" for name, value in results["bytes"].items()}
+    lines += ["", "| a frame | bytes |", "|---|---|"]
+    lines += [
+        f"| picture, JPEG of quality 95, 4:4:4 | {sizes['jpeg']} |",
+        f"| the same as PNG | {sizes['png']} |",
+        f"| row of the table: truth, markers, covariances, parameters | {sizes['table']} |",
+    ]
+    lines += ["", "| scheduler | start | a shard without work |", "|---|---|---|"]
+    lines += [
+        f"| {row['scheduler']} | {row['start_s']:.1f} s | {row['ms_a_shard']:.0f} ms |"
+        for row in results["overheads"]
+    ]
+    paper = sum_on_paper(results)
+    on_cores = ", ".join(f"{paper['hours'] / count:,.0f} on {count:,}" for count in (64, 1000))
+    sums = [
+        f"| {MILLIONS} million frames | |",
+        "|---|---|",
+        f"| core hours | {paper['hours']:,.0f}; so many hours on cores: {on_cores} |",
+        f"| JPEG and tables | {paper['size_gb'] / 1e3:.2f} TB |",
+        f"| computed, at {CORE_HOUR_USD} USD a core hour | {paper['compute_usd']:,.0f} USD |",
+        f"| kept, at {GB_MONTH_USD} USD a GB and month | {paper['store_usd_month']:,.0f} USD a month |",
+    ]
+    caption = f"Measured: {conditions_text(results['conditions'])}"
+    return {"datasets": "\n".join([*lines, "", caption]), "datasets-sum": "\n".join(sums)}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print the tables, write the JSON file if asked."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.datasets", description=(__doc__ or "").split("\n")[0]
+    )
+    parser.add_argument("--quick", action="store_true", help="few frames: a look, no figures to quote")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure, too")
+    parser.add_argument(
+        "--publish", action="store_true", help="write docs/measured and the page that shows it"
+    )
+    options = parser.parse_args(arguments)
+    shards = QUICK_SHARDS if options.quick else SHARDS
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rates = [measure_rendering(folder, shards), measure_extraction(folder, shards)]
+        sizes = measure_sizes(folder)
+    results = {
+        "conditions": machine_conditions(),
+        "rates": [asdict(one) | {"efficiency": one.efficiency} for one in rates],
+        "bytes": asdict(sizes),
+        "overheads": [asdict(one) for one in measure_overheads()],
+    }
+    console = Console()
+    console.print(rates_table(rates))
+    console.print(other_table(results))
+    console.print(conditions_text(), style="dim", soft_wrap=True)
+    if options.json:
+        write_json(options.json, results)
+    if options.publish:
+        for path in write_published("datasets", results, markdown(results)):
+            console.print(f"wrote {path}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
