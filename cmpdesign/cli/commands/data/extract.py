@@ -24,7 +24,7 @@ def extract(
     sources: Annotated[
         list[str],
         typer.Argument(
-            metavar="SOURCE...", help='Videos, folders of pictures, patterns such as "run*/*.mp4".'
+            metavar="SOURCE", help='Videos, folders of pictures, patterns such as "run*/*.mp4".'
         ),
     ],
     output: Annotated[
