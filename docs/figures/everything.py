@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks.camera.page import page_pictures
 
-from . import api, commands, fields, gallery, measured, reasons
+from . import api, commands, fields, gallery, measured, presets, reasons
 from .pictures import contact, drawings, failures, hero, lengths, scene_templates, sides, stages, surface
 from .pictures.tutorials import photos
 
@@ -37,13 +37,15 @@ def pictures() -> dict[str, bytes]:
 
 
 def pages() -> dict[Path, str]:
-    """Path -> text of generated pages. Of docs/reference/design-files.md only the tables are generated."""
+    """Path -> text of generated pages. Of design-files.md and extractor.md only tables are generated."""
+    extractor = DOCS / "explanation" / "extractor.md"
     design_files = DOCS / "reference" / "design-files.md"
     return {
         DOCS / "reference" / "gallery.md": gallery.page(),
         DOCS / "reference" / "command-line.md": commands.page(),
         DOCS / "reference" / "api.md": api.page(),
         DOCS / "reference" / "reasons.md": reasons.page(),
+        extractor: presets.filled(extractor.read_text(encoding="utf-8")),
         design_files: fields.filled(design_files.read_text(encoding="utf-8")),
         **measured.pages(),
     }
