@@ -4,14 +4,16 @@
 
 "rendered": the shipped plan pressed-objects: every frame is drawn, its contact solved, rendered, encoded as JPEG and
 read. "extracted": the same pictures as videos (FFV1, 640 x 480 px), decoded and read. Frames a second are those of the
-whole command, the start of its workers included; "efficiency" is the rate on two workers over twice that on one. Sizes
-are those of the shards' files. "start" and "a shard without work" are what a scheduler takes itself. The sum for 10
-million frames multiplies these figures; its prices are assumptions, stated beside it.
+whole command, the start of its workers included; "efficiency" is the rate on two workers over twice that on one; core
+milliseconds a frame depend little on what else the machine does. Sizes are those of the shards' files. "start" and "a
+shard without work" are what a scheduler takes itself. The sum for 10 million frames multiplies core time and sizes; its
+prices are assumptions, stated beside it.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import sys
 import tempfile
 import time
@@ -36,7 +38,7 @@ from cmpdesign.files.images import to_png
 from cmpdesign.tracking.export.video import Codec, CodecVideo
 from extractor import load_layout
 
-FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 16, 2
+FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 12, 2
 VIDEOS, REPEATS = 2, 4  # every picture is in the videos several times
 EMPTY_SHARDS = 200
 MILLIONS = 10
@@ -45,16 +47,26 @@ CORE_HOUR_USD, GB_MONTH_USD = 0.04, 0.023  # assumed: a spot core and object sto
 
 @dataclass(frozen=True)
 class Rates:
-    """Frames a second on one and on two workers."""
+    """Frames a second, and core milliseconds a frame, on one and on two workers."""
 
     what: str
     frames: int
     one: float
     two: float
+    ms_one: float
+    ms_two: float
 
     @property
     def efficiency(self) -> float:
         return self.two / (2 * self.one)
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What work took: time, and the time of all cores, of this process and of its workers."""
+
+    seconds: float
+    core_seconds: float
 
 
 @dataclass(frozen=True)
@@ -75,10 +87,28 @@ class Sizes:
     table: float
 
 
-def seconds(work: Callable[[], object]) -> float:
-    started = time.perf_counter()
+def spent(work: Callable[[], object]) -> Spent:
+    started, before = time.perf_counter(), core_seconds()
     work()
-    return time.perf_counter() - started
+    return Spent(time.perf_counter() - started, core_seconds() - before)
+
+
+def core_seconds() -> float:
+    """Of this process, and of workers that have ended."""
+    kinds = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    used = [resource.getrusage(kind) for kind in kinds]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def rates_of(what: str, frames: int, one: Spent, two: Spent) -> Rates:
+    return Rates(
+        what,
+        frames,
+        frames / one.seconds,
+        frames / two.seconds,
+        1e3 * one.core_seconds / frames,
+        1e3 * two.core_seconds / frames,
+    )
 
 
 def small_plan(folder: Path, shards: int) -> Path:
@@ -101,7 +131,7 @@ def measure_rendering(folder: Path, shards: int) -> Rates:
     """The plan made by one and by two workers; it is left in the folder "data1"."""
     plan, frames = small_plan(folder, shards), shards * FRAMES_A_SHARD
     times = [
-        seconds(
+        spent(
             lambda count=count: make_dataset(  # type: ignore[misc]
                 plan, folder / f"data{count}", ShardRange(), Scheduler(workers=count)
             )
@@ -110,7 +140,7 @@ def measure_rendering(folder: Path, shards: int) -> Rates:
     ]
     if (folder / "data1/manifest.json").read_bytes() != (folder / "data2/manifest.json").read_bytes():
         raise RuntimeError("one and two workers made different bytes")
-    return Rates("rendered", frames, frames / times[0], frames / times[1])
+    return rates_of("rendered", frames, times[0], times[1])
 
 
 def write_videos(folder: Path, shards: int) -> list[str]:
@@ -131,9 +161,9 @@ def measure_extraction(folder: Path, shards: int) -> Rates:
     for count in (1, 2):
         out = folder / f"markers{count}"
         options = (Reading(), Scheduler(workers=count), 4 * FRAMES_A_SHARD)
-        times.append(seconds(lambda: extract_markers(layout, videos, out, *options)))  # noqa: B023
+        times.append(spent(lambda: extract_markers(layout, videos, out, *options)))  # noqa: B023
         frames = len(load(out))
-    return Rates("extracted", frames, frames / times[0], frames / times[1])
+    return rates_of("extracted", frames, times[0], times[1])
 
 
 def measure_sizes(folder: Path) -> Sizes:
@@ -149,8 +179,8 @@ def do_nothing(number: int) -> int:
 
 
 def measure_overhead(name: str, scheduler: Scheduler) -> Overhead:
-    start_s = seconds(lambda: list(results_of(do_nothing, [0], scheduler)))
-    many_s = seconds(lambda: list(results_of(do_nothing, range(EMPTY_SHARDS), scheduler)))
+    start_s = spent(lambda: list(results_of(do_nothing, [0, 1], scheduler))).seconds
+    many_s = spent(lambda: list(results_of(do_nothing, range(EMPTY_SHARDS), scheduler))).seconds
     return Overhead(name, start_s, max(0.0, 1e3 * (many_s - start_s) / EMPTY_SHARDS))
 
 
@@ -167,7 +197,7 @@ def measure_overheads() -> list[Overhead]:
 def rates_table(rates: Sequence[Rates]) -> Table:
     table = Table(title="Frames a second", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
     table.add_column("frames", no_wrap=True)
-    for name in ("number", "one worker", "two workers", "efficiency"):
+    for name in ("number", "one worker", "two workers", "efficiency", "core ms a frame", "on two"):
         table.add_column(name, justify="right", no_wrap=True)
     for one in rates:
         table.add_row(one.what, f"{one.frames}", f"{one.one:.1f}", f"{one.two:.1f}", f"{one.efficiency:.2f}")
@@ -194,7 +224,7 @@ def other_table(results: Mapping[str, Any]) -> Table:
 
 def sum_on_paper(results: Mapping[str, Any]) -> dict[str, float]:
     """Core hours, GB and USD of 10 million frames."""
-    hours = MILLIONS * 1e6 / results["rates"][0]["one"] / 3600
+    hours = MILLIONS * 1e6 * results["rates"][0]["ms_one"] / 3.6e6
     size_gb = MILLIONS * 1e6 * (results["bytes"]["jpeg"] + results["bytes"]["table"]) / 1e9
     return {
         "hours": hours,
@@ -206,9 +236,13 @@ def sum_on_paper(results: Mapping[str, Any]) -> dict[str, float]:
 
 def markdown(results: Mapping[str, Any]) -> dict[str, str]:
     """The blocks of the page docs/how-to/datasets.md."""
-    lines = ["| frames a second | one worker | two workers | efficiency |", "|---|---|---|---|"]
+    lines = [
+        "| frames a second | one worker | two workers | efficiency | core ms a frame | on two workers |",
+        "|---|---|---|---|---|---|",
+    ]
     lines += [
         f"| {row['what']} | {row['one']:.1f} | {row['two']:.1f} | {row['efficiency']:.2f} |"
+        f" {row['ms_one']:.0f} | {row['ms_two']:.0f} |"
         for row in results["rates"]
     ]
     sizes = {name: f"{value / 1e3:.0f} kB" for name, value in results["bytes"].items()}

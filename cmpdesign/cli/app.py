@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import sys
 from typing import Annotated
 
 import typer
@@ -13,7 +15,8 @@ from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.starting import init, schema, templates
-from cmpdesign.cli.terminal import print_document
+from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
+from cmpdesign.errors import OutputError
 
 app = typer.Typer(
     cls=OneLineErrors,
@@ -68,3 +71,12 @@ def main() -> None:
         app()
     except KeyboardInterrupt:  # before or after a command
         exit_interrupted()
+    except OutputError as error:  # the version
+        print_error(error)
+        sys.exit(EXIT_BAD_INPUT)
+    except OSError as error:  # help texts
+        if error.errno != errno.ENOSPC or error.filename is not None:
+            raise
+        discard_output()
+        print_error(f"standard output: cannot be written ({error.strerror})")
+        sys.exit(EXIT_BAD_INPUT)

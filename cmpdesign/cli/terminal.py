@@ -6,17 +6,21 @@ the window or hide what was printed. ``visible`` replaces them, and every functi
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from cmpdesign.cli.mode import current_mode
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
@@ -96,7 +100,8 @@ def _print_message(level: str, line: str, **fields: Any) -> None:
         line = visible(json.dumps(message, ensure_ascii=False))
     else:
         line = f"{level}: {line}"
-    print(line, file=sys.stderr)
+    if sys.stderr is not None:  # None: the caller closed it
+        print(line, file=sys.stderr)
 
 
 def say(*objects: Any, **options: Any) -> None:
@@ -105,8 +110,9 @@ def say(*objects: Any, **options: Any) -> None:
     Args:
         objects, options: as of rich's ``Console.print``.
     """
-    if current_mode().prints_text:
-        console().print(*objects, **options)
+    if current_mode().prints_text and sys.stdout is not None:
+        with _writing_output():
+            console().print(*objects, **options)
 
 
 def say_text(text: str) -> None:
@@ -116,8 +122,33 @@ def say_text(text: str) -> None:
 
 
 def print_document(text: str) -> None:
-    """Print lines, such as a document of JSON, on stdout as they are, without wrapping."""
-    sys.stdout.write(visible(text, keep="\n"))
+    """Print lines, such as a document of JSON, on stdout as they are, without wrapping.
+
+    Raises:
+        OutputError: standard output cannot be written, as on a full disk.
+    """
+    if sys.stdout is not None:  # None: the caller closed it
+        with _writing_output():
+            sys.stdout.write(visible(text, keep="\n"))
+            sys.stdout.flush()
+
+
+@contextmanager
+def _writing_output() -> Iterator[None]:
+    """Within this context, an error of standard output is an ``OutputError``, and the rest of the output is lost."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno == errno.EPIPE:  # the reader, as head, has enough; click ends the program
+            raise
+        discard_output()
+        raise OutputError(f"standard output: cannot be written ({error.strerror or error})") from None
+
+
+def discard_output() -> None:
+    """Write the rest of standard output to nowhere: Python would try again, and fail again, at its end."""
+    with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def finish(make_document: Callable[[], Document], exit_code: int = 0) -> None:

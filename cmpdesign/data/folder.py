@@ -25,7 +25,13 @@ from pathlib import Path
 from typing import Any
 
 from cmpdesign.errors import CmpDesignError, InputError, OutputError
-from cmpdesign.files.atomic import Stage, remove_abandoned_stages, write_file, write_folder
+from cmpdesign.files.atomic import (
+    STAGE_PREFIX,
+    Stage,
+    remove_abandoned_stages,
+    write_file,
+    write_folder,
+)
 from cmpdesign.inputs.documents import parse_json, read_json
 from cmpdesign.inputs.files import open_file, path_exists, read_text
 
@@ -87,7 +93,7 @@ def open_folder(folder: Path, prepared: Prepared) -> None:
                 f"{folder}: holds a data set of another plan (digest {there['digest'][:12]}, this one "
                 f"{prepared.document['digest'][:12]}); give a new folder"
             )
-    elif path_exists(folder) and any(folder.iterdir()):
+    elif path_exists(folder) and any(not _is_of_start(path.name) for path in folder.iterdir()):
         raise CmpDesignError(f"{folder}: is not empty and holds no plan.json; give a new folder")
     text = json.dumps(prepared.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     files: dict[str, str | bytes] = {
@@ -97,6 +103,11 @@ def open_folder(folder: Path, prepared: Prepared) -> None:
         files[PLAN] = text  # renamed last
     if files:
         write_folder(folder, files)
+
+
+def _is_of_start(name: str) -> bool:
+    """Whether another process, which starts at the same time, may have made this before plan.json."""
+    return name in ("layouts", "inputs") or name.startswith(STAGE_PREFIX)
 
 
 def read_plan(folder: Path) -> Mapping[str, Any]:

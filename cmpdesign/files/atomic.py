@@ -14,9 +14,9 @@ from pathlib import Path
 from cmpdesign.errors import OutputError
 from cmpdesign.files.locks import Lock, open_for_lock, try_lock
 
-_STAGE_PREFIX = ".cmpdesign-"
+STAGE_PREFIX = ".cmpdesign-"
 # Names that ``tempfile.mkdtemp`` makes of the prefix.
-_STAGE_NAME = re.compile(re.escape(_STAGE_PREFIX) + "[a-z0-9_]{8}")
+_STAGE_NAME = re.compile(re.escape(STAGE_PREFIX) + "[a-z0-9_]{8}")
 
 
 class Stage:
@@ -38,7 +38,7 @@ class Stage:
     def __init__(self, parent: Path) -> None:
         remove_abandoned_stages(parent)
         while True:
-            self.folder = Path(tempfile.mkdtemp(prefix=_STAGE_PREFIX, dir=parent))
+            self.folder = Path(tempfile.mkdtemp(prefix=STAGE_PREFIX, dir=parent))
             self._descriptor = open_for_lock(self.folder)
             if self._descriptor is None:
                 return

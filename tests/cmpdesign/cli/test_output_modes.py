@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import jsonschema
@@ -21,6 +24,7 @@ COMMANDS = {
     "verify": ("verify", "layout.json", "seen.png"),
     "track": ("track", "layout.json", "seen.png", "-o", "run.npz"),
 }
+ROOT = Path(__file__).parents[3]
 every_command = pytest.mark.parametrize("name", COMMANDS)
 
 
@@ -67,3 +71,28 @@ def test_errors_are_printed_in_every_mode() -> None:
     (line,) = run("build", "none.toml", "--json").stderr.splitlines()
     assert json.loads(line)["level"] == "error" and json.loads(line)["exit_code"] == 2
     assert "exclude each other" in refused("templates", "--quiet", "--verbose")
+
+
+def output_to(words: str, standard_output: str) -> tuple[int, str]:
+    """Exit code and standard error of the program in a shell, which opens its standard output."""
+    result = subprocess.run(
+        f"{sys.executable} -m cmpdesign {words} {standard_output}",
+        shell=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return result.returncode, result.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no file that is always full")
+@pytest.mark.parametrize("words", ["check honeycomb --set layers=2", "--version", "build --help"])
+def test_output_that_cannot_be_written_is_one_line(words: str) -> None:
+    expected = "error: standard output: cannot be written (No space left on device)\n"
+    assert output_to(words, "> /dev/full") == (2, expected)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell of another kind")
+def test_closed_output_is_no_error() -> None:
+    assert output_to("check honeycomb --set layers=2 --json", ">&-") == (0, "")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from cmpdesign.data.folder import open_folder, read_plan
 from cmpdesign.data.frames.plan import prepare_plan
 from tests.support.command import refused
 from tests.support.made.datasets import DESIGN, write_plan
@@ -68,6 +69,17 @@ def test_folders_of_other_things_are_left_alone(tmp_path: Path) -> None:
     plan = write_plan(tmp_path)
     assert "is not empty and holds no plan.json" in refused("dataset", plan, "-o", tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.toml", "small.toml"]
+
+
+def test_processes_may_start_at_the_same_time(tmp_path: Path) -> None:
+    """As the jobs of an array do: another one has made a part of the folder, or all."""
+    prepared = prepare_plan(write_plan(tmp_path))
+    folder = tmp_path / "data"
+    (folder / "layouts").mkdir(parents=True)
+    (folder / ".cmpdesign-abcdefgh").mkdir()
+    open_folder(folder, prepared)
+    open_folder(folder, prepared)
+    assert read_plan(folder)["digest"] == prepared.document["digest"]
 
 
 def test_the_digest_is_of_what_frames_depend_on(tmp_path: Path) -> None:

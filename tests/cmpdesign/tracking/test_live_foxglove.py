@@ -203,8 +203,10 @@ def test_what_viewers_did_not_get_is_said(
     options = ("--live", "foxglove", "--live-port", "0")
     monkeypatch.setattr("cmpdesign.tracking.live.view.QUEUE_FRAMES", 1)
     monkeypatch.setattr(FoxgloveServer, "send", lambda *_: time.sleep(0.2))
+    monkeypatch.setattr(FoxgloveServer, "is_behind", lambda _: True)
     result = run(*command, *options)
     assert result.exit_code == 0 and f"of {FRAMES} frames were not shown live" in result.stderr
+    assert "a live viewer read more slowly than frames came" in " ".join(result.stderr.split())
     monkeypatch.setattr(FoxgloveServer, "send", lambda *_: 1 / 0)
     result = run(*command, *options)
     assert result.exit_code == 0 and "the live server stopped after 0 frames (ZeroDivision" in result.stderr
