@@ -38,8 +38,8 @@ from cmpdesign.files.images import to_png
 from cmpdesign.tracking.export.video import Codec, CodecVideo
 from extractor import load_layout
 
-FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 12, 2
-VIDEOS, REPEATS = 2, 4  # every picture is in the videos several times
+FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 10, 2
+VIDEOS, REPEATS = 2, 8  # every picture is in the videos several times
 EMPTY_SHARDS = 200
 MILLIONS = 10
 CORE_HOUR_USD, GB_MONTH_USD = 0.04, 0.023  # assumed: a spot core and object storage of a large provider, 2025
@@ -197,7 +197,7 @@ def measure_overheads() -> list[Overhead]:
 def rates_table(rates: Sequence[Rates]) -> Table:
     table = Table(title="Frames a second", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
     table.add_column("frames", no_wrap=True)
-    for name in ("number", "one worker", "two workers", "efficiency", "core ms a frame", "on two"):
+    for name in ("number", "one worker", "two workers", "efficiency", "core ms", "on two"):
         table.add_column(name, justify="right", no_wrap=True)
     for one in rates:
         table.add_row(one.what, f"{one.frames}", f"{one.one:.1f}", f"{one.two:.1f}", f"{one.efficiency:.2f}")
