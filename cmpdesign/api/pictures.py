@@ -158,7 +158,7 @@ def render(
         return draw(plain_scene(layout, seed or 0, **view), size=size or SIZE_PX)
     if view:
         raise CmpDesignError(
-            f"{next(iter(view))} has no place beside a scene; write it into the scene's file, or give no scene"
+            f"{next(iter(view))} cannot be given with a scene; write the value into the scene's file, or give no scene"
         )
     file = load_scene(scene, layout, size, seed)
     if file.fps is not None:

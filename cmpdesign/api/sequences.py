@@ -100,7 +100,7 @@ class Reading:
         """The live server's options."""
         if self.live is None:
             if self.live_port is not None or self.live_wait_s:
-                raise CmpDesignError("--live-port and --live-wait are options of --live; give it, too")
+                raise CmpDesignError("--live-port and --live-wait need --live")
             return None
         return Live(self.live, self.live_port, self.live_wait_s)
 

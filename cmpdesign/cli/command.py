@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -25,6 +26,7 @@ from cmpdesign.inputs.texts import visible
 from cmpdesign.libraries import missing_library_text
 
 INTERRUPTED = "interrupted; every file that was written is complete"
+_ARGUMENT_TYPE = re.compile(r"^(  [A-Z]+)( <[^>]+>)", re.MULTILINE)
 _OUTPUT_PARAMETERS = output_parameters()
 
 
@@ -52,6 +54,10 @@ class Command(TyperCommand):
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         _write_examples(self.epilog, formatter)
+
+    def get_help(self, ctx: Any) -> str:
+        """The help text without the types of arguments, which are Python's, as in "SOURCE <list[str]>"."""
+        return _ARGUMENT_TYPE.sub(lambda found: found[1] + " " * len(found[2]), super().get_help(ctx))
 
     def invoke(self, ctx: Any) -> Any:
         mode = Mode(*(ctx.params.pop(name) for name in NAMES))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +21,7 @@ from cmpdesign.data.folder import (
 from cmpdesign.data.frames.plan import prepare_plan
 from cmpdesign.data.schedule.schedulers import Scheduler, results
 from cmpdesign.data.shard import make_shard
-from cmpdesign.data.videos.extraction import Reading, index_source, name_tasks, prepare_extraction
+from cmpdesign.data.videos.extraction import Reading, SourceTask, index_source, name_tasks, prepare_extraction
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.libraries import require_libraries
 from cmpdesign.watch import tell
@@ -94,9 +95,21 @@ def extract_markers(
     if frames_a_shard < 1:
         raise CmpDesignError(f"frames_a_shard is {frames_a_shard}; it must be 1 or more")
     tasks = name_tasks(sources, frames_a_shard)
-    found: dict[str, dict[str, Any]] = {one["name"]: one for one in results(index_source, tasks, scheduler)}
-    prepared = prepare_extraction(layout, [found[task.name] for task in tasks], reading)
+    indexed = {source["name"]: source for source in _index(tasks, scheduler)}
+    prepared = prepare_extraction(layout, [indexed[task.name] for task in tasks], reading)
     return _carry_out(prepared, Path(folder).resolve(), ShardRange(), scheduler)
+
+
+def _index(tasks: Sequence[SourceTask], scheduler: Scheduler) -> list[dict[str, Any]]:
+    """The sources, cut; here by threads, because files are mostly waited for."""
+    names = [task.name for task in tasks]
+    for name in names:
+        if names.count(name) > 1:
+            raise CmpDesignError(f"{name}: is given twice; give each source once")
+    if scheduler.address:
+        return list(results(index_source, tasks, scheduler))
+    with ThreadPoolExecutor(scheduler.workers) as pool:
+        return list(pool.map(index_source, tasks))
 
 
 def _carry_out(prepared: Prepared, folder: Path, shards: ShardRange, scheduler: Scheduler) -> Progress:

@@ -47,6 +47,7 @@ from tests.docs.stand_ins import make_stand_in
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+TUTORIALS = ROOT / "docs" / "tutorials" / "README.md"
 IMAGES = ROOT / "docs" / "images"
 FENCE = re.compile(r"^```(\w+)(?: ([\w.]+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 DECIMAL = re.compile(r"-?\d+\.\d+")
@@ -175,7 +176,7 @@ def run_python(block: Block, names: dict[str, Any], page: str) -> None:
 @pytest.mark.parametrize(
     "page",
     [pytest.param(page, marks=pytest.mark.slow if page.stem in SLOW_PAGES else ()) for page in PAGES],
-    ids=lambda page: page.stem if page.parent.name != "tutorials" or page.stem != "README" else "tutorials",
+    ids=lambda page: "tutorials" if page == TUTORIALS else page.stem,
 )
 def test_every_command_and_snippet_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -205,6 +205,6 @@ def _given_options(ctx: typer.Context) -> set[str]:
     for name in sorted(given & SCENE_FILE_KEYS.keys()):
         option = "--front or --mirrored" if name == "mirrored" else f"--{name.replace('_', '-')}"
         raise CmpDesignError(
-            f"{option} has no place beside --scene; write {SCENE_FILE_KEYS[name]} into the file"
+            f"{option} cannot be given with --scene; write {SCENE_FILE_KEYS[name]} into the file"
         )
     return given

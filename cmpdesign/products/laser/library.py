@@ -116,7 +116,7 @@ def settings_on(material: Material, machine_name: str) -> Settings:
     name = Path(machine_name).stem if machine_name.endswith(".toml") else machine_name
     if name not in material.on:
         raise DesignError(
-            f"laser.machine = {name!r}: the material {material.name!r} has no settings for it, only for "
+            f"laser.machine = {name!r}: the material {material.name!r} has no settings for this machine, only for "
             f"{', '.join(material.on)}; choose one of these, another material, or add [on.{name}] to its file"
         )
     return material.on[name]

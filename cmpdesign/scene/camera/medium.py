@@ -93,7 +93,7 @@ def window_at_rest(medium: Medium, rotation: Points, shift_mm: Points) -> Window
     if not distance_mm > 0:
         raise SceneError(
             f"the camera stands {abs(height):.3g} mm from the pattern's plane, within [medium] gel_mm + window_mm = "
-            f"{medium.gel_mm + medium.window_mm:.3g} mm; move it away"
+            f"{medium.gel_mm + medium.window_mm:.3g} mm; move the camera away"
         )
     x, y, z = (float(v) for v in (axis if height > 0 else -axis))
     return WindowPlane((x, y, z), distance_mm)

@@ -73,9 +73,9 @@ def test_the_command_refuses_what_does_not_fit(run: Callable[..., tuple[int, str
         (MOVING, ("-o", tmp_path / "full"), "is no empty folder"),
         (odd, ("-o", tmp_path / "a.mp4"), "an .mp4 has even sides"),
         (deep, ("-o", tmp_path / "a.avi"), "a video has 8 bits, the sensor 16"),
-        (still, ("-o", tmp_path / "a.png", "--pitch", 30), "--pitch has no place beside --scene"),
+        (still, ("-o", tmp_path / "a.png", "--pitch", 30), "--pitch cannot be given with --scene"),
         (still, ("-o", tmp_path / "a.png", "--response", "linear"), "write [sensor] response into the file"),
-        (still, ("-o", tmp_path / "a.png", "--front"), "--front or --mirrored has no place"),
+        (still, ("-o", tmp_path / "a.png", "--front"), "--front or --mirrored cannot be given"),
     ):
         code, said = run(text, *words)
         assert code == 2 and message in said, said

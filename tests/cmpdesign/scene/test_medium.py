@@ -163,7 +163,9 @@ def test_a_surface_that_is_pressed_into_the_window_is_refused() -> None:
 
 def test_a_camera_within_the_gel_is_refused() -> None:
     scene = Scene(small_layout(), camera(name="left"), medium=replace(MEDIUM, gel_mm=60.0))
-    with pytest.raises(SceneError, match=r"view left: the camera stands .* within .* = 62 mm; move it away"):
+    with pytest.raises(
+        SceneError, match=r"view left: the camera stands .* within .* = 62 mm; move the camera away"
+    ):
         render_truth(scene, size=SIZE)
 
 

@@ -217,7 +217,7 @@ def test_what_viewers_did_not_get_is_said(
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (("--live-port", "9"), "--live-port and --live-wait are options of --live"),
+        (("--live-port", "9"), "--live-port and --live-wait need --live"),
         (("--live", "foxglove", "--live-port", "65536"), "--live-port 65536: expected a number from 0"),
         (("--live", "foxglove", "--live-wait", "-1"), "--live-wait -1: expected a number of seconds"),
         (("--live", "rerun", "--live-wait", "1"), "Rerun's server keeps the frames"),

@@ -11,9 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-pytest.importorskip(
-    "rerun", reason="rerun-sdk, of some 500 MB, is not installed: pip install 'cmpdesign[rerun]'"
-)
+pytest.importorskip("rerun", reason="rerun-sdk, of some 500 MB, is not installed: pip install '.[rerun]'")
 
 from rerun.chunk import RrdReader
 

@@ -23,9 +23,7 @@ def extract(
     layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
     sources: Annotated[
         list[str],
-        typer.Argument(
-            metavar="SOURCE...", help='Videos, folders of pictures, patterns such as "run*/*.mp4".'
-        ),
+        typer.Argument(metavar="SOURCE", help='Videos, folders of pictures, patterns such as "run*/*.mp4".'),
     ],
     output: Annotated[
         Path,

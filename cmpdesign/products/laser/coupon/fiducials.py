@@ -35,8 +35,8 @@ def find_fiducials(gray: NDArray[np.uint8], coupon: Coupon) -> Values:
             best = found
     if best is None:
         raise PhotoError(
-            "the coupon's five round marks were not found; show all of it, sharp, on an even ground that is much "
-            "darker or brighter than the sheet"
+            "the coupon's five round marks were not found; show the whole coupon, sharp, on an even ground that is "
+            "much darker or brighter than the sheet"
         )
     return best[1]
 

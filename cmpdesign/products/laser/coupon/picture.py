@@ -105,5 +105,5 @@ def image_points(to_image: PointMap, points_mm: Values, shape: tuple[int, ...]) 
     xy = to_image(points_mm.reshape(-1, 2)).reshape(points_mm.shape).astype(np.float32)
     height, width = shape[:2]
     if not ((xy >= 0).all() and (xy[..., 0] < width).all() and (xy[..., 1] < height).all()):
-        raise PhotoError("a part of the coupon lies outside the picture; show all of it")
+        raise PhotoError("a part of the coupon lies outside the picture; show the whole coupon")
     return xy

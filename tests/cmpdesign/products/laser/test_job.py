@@ -108,7 +108,7 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
         (["laser.material=silicon-black"], "did you mean silicone-black?"),
         (
             ["laser.machine=diode-blue-10w", "laser.material=pdms"],
-            "has no settings for it, only for co2-40w, uv-5w",
+            "has no settings for this machine, only for co2-40w, uv-5w",
         ),
         (["laser.kerf_mm=0.1", "laser.kerf_x_mm=0.1"], "fix the kerf twice"),
         (["laser.corner=round"], "laser.corner = 'round' must be 'plain' or 'overcut'"),
