@@ -62,8 +62,9 @@ def test_every_reason_is_explained_with_a_picture() -> None:
 def test_every_environment_variable_is_named() -> None:
     page = (DOCS / "reference" / "environment.md").read_text(encoding="utf-8")
     read = re.compile(r"""environ(?:\.get|\.setdefault|\.pop)?[(\[]"(\w+)"|ENV\{(\w+)\}""")
-    files = [path for folder in ("cmpdesign", "extractor", "cmake") for path in (ROOT / folder).rglob("*")]
-    texts = [path.read_text() for path in files if path.suffix in (".py", ".cmake", ".txt")]
+    files = [path for folder in ("cmpdesign", "extractor") for path in (ROOT / folder).rglob("*.py")]
+    files += [ROOT / "cmake" / name for name in ("CMakeLists.txt", "zig.cmake")]
+    texts = [path.read_text(encoding="utf-8") for path in files]
     named = {name for text in texts for pair in read.findall(text) for name in pair if name}
     assert "ZIG_TARGET" in named
     assert {name for name in named if f"`{name}`" not in page} == set()

@@ -73,6 +73,14 @@ REFINEMENT = (
         "typical_move(shift, estimate.information) < 0.0",
     ),
     Rule(
+        "settled appearance",
+        "a step follows while blur or dot gain still change",
+        "accuracy",
+        "extractor/refine/synthesis_steps.py",
+        "if judged and is_settled and",
+        "if judged and",
+    ),
+    Rule(
         "scatter",
         "where markers lie by themselves off the smooth map, gridlines do not curve as its tangents say",
         "accuracy",

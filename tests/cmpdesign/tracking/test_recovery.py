@@ -216,7 +216,7 @@ def test_a_run_killed_before_its_first_frame(made: Path, tmp_path: Path) -> None
     killed(made / "layout.json", 0, *tables)
     for recovered, table in zip(tables[::2], tables[1::2], strict=True):
         result = run("track", made / "layout.json", "frames", "-o", recovered, "--recover")
-        assert result.exit_code == 1 and "before its first frame was written" in result.stderr
+        assert result.exit_code == 1 and "the run ended before its first frame" in result.stderr
         tracker = Tracker(reference())
         sink = open_sink(table, TrackTable(tracker))
         sink.add(tracker.track(None))
