@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +43,12 @@ def typical_move(shift: NDArray[np.float64], information: Information) -> float:
     xx, xy, yy = information.diagonal.T
     square = xx * x * x + 2 * xy * x * y + yy * y * y
     known = square[square > 0]
-    return float(np.sqrt(0.5 * LIMITS.mean_over_median * np.median(known))) if known.size else np.nan
+    middle = known.size // 2
+    return (
+        math.sqrt(0.5 * LIMITS.mean_over_median * np.partition(known, middle)[middle])
+        if known.size
+        else math.nan
+    )
 
 
 def convergence_covariance(
