@@ -38,8 +38,8 @@ from cmpdesign.files.images import to_png
 from cmpdesign.tracking.export.video import Codec, CodecVideo
 from extractor import load_layout
 
-FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 10, 2
-VIDEOS, REPEATS = 2, 8  # every picture is in the videos several times
+FRAMES_A_SHARD, SHARDS, QUICK_SHARDS = 8, 32, 2
+VIDEOS, REPEATS = 2, 32  # every picture is in the videos several times
 EMPTY_SHARDS = 200
 MILLIONS = 10
 CORE_HOUR_USD, GB_MONTH_USD = 0.04, 0.023  # assumed: a spot core and object storage of a large provider, 2025
