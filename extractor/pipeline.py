@@ -226,7 +226,8 @@ class Extractor:
         places, size = numbered.places, pyramid.size
         refined = stages.record("refine", self._refiner(pyramid, places, before))
         repaired = stages.record("repair", repair_markers(refined, places, self._lattice, size))
-        virtual = stages.record("virtual", locate_virtual_markers(self._topology, repaired, refined.points))
+        located = locate_virtual_markers(self._topology, repaired, refined.points, refined.scatter)
+        virtual = stages.record("virtual", located)
         few = is_less_than_half_reported(repaired.xy_px, self.layout.xy_mm, self._lattice.present, size)
         view, cells = pyramid.level(1), self._sampled_cells
         quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined.blur_px)

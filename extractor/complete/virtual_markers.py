@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
+from extractor.refine.measure.marker_scatter import BEND_BY_SCATTER, MarkerScatter
 from extractor.refine.synthesis.gridlines import local_maps
 from extractor.result import Status
 
@@ -25,10 +26,12 @@ class VirtualLimits(NamedTuple):
     Attributes:
         max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt.
         bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord.
+        bend_by_scatter: as in ``BendingLimits``.
     """
 
     max_measured_offset: float = 0.08
     bend_uncertainty: float = 0.05
+    bend_by_scatter: float = BEND_BY_SCATTER
 
 
 LIMITS = VirtualLimits()
@@ -41,12 +44,14 @@ class GridlineEnds(NamedTuple):
         xy_px, cov_px2: (M, 2) and (M, 2, 2) float64.
         known: (M,) bool.
         maps: (M, 2, 5) float64, the local map at each marker.
+        scatter: of the markers.
     """
 
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     known: NDArray[np.bool_]
     maps: NDArray[np.float64]
+    scatter: MarkerScatter
 
 
 class VirtualMarkers(NamedTuple):
@@ -63,7 +68,7 @@ class VirtualMarkers(NamedTuple):
 
 
 def locate_virtual_markers(
-    topology: Topology, repaired: RepairedMarkers, points: NDArray[np.float64]
+    topology: Topology, repaired: RepairedMarkers, points: NDArray[np.float64], scatter: MarkerScatter
 ) -> VirtualMarkers:
     """The virtual markers at the fractions (j + 1) / (m + 1) of every edge from its smaller id.
 
@@ -72,6 +77,7 @@ def locate_virtual_markers(
 
     Args:
         points: (E, m, 3) float64, measured x and y (px) and their variance across the gridline (px^2), NaN for none.
+        scatter: of the markers; with some, the gridlines curve as the map's second derivatives say.
     """
     if points.shape[1] == 0:
         return VirtualMarkers(
@@ -80,5 +86,5 @@ def locate_virtual_markers(
     maps = local_maps(
         repaired.xy_px, topology.ring_markers, topology.ring_vectors, topology.derivative_stencil
     )
-    ends = GridlineEnds(repaired.xy_px, repaired.cov_px2, repaired.status != Status.LOST, maps)
+    ends = GridlineEnds(repaired.xy_px, repaired.cov_px2, repaired.status != Status.LOST, maps, scatter)
     return VirtualMarkers(*native.locate_on_edges(ends, topology, points, LIMITS))

@@ -11,6 +11,7 @@ from extractor.layout.reference import BLACK, Reference
 
 MAX_NEIGHBOURS = 6  # of a marker
 MAX_RING_MARKERS = 18  # in the two rings around a marker
+MAP_DERIVATIVES = 5  # x, y, xx, xy, yy
 MAX_CONDITION = 1e8  # of the normal equations of a cubic
 MAX_ONWARD_COSINE = np.cos(np.radians(150.0))  # between the two edges at a marker that form one gridline
 
@@ -29,8 +30,8 @@ class Topology(NamedTuple):
         ring_markers: (M, 18) int32, the markers in the two rings around each marker, the first ring first.
         ring_vectors: (M, 18, 2) float64, the layout vectors from a marker to its ``ring_markers``, in units of the
             mean edge, y up.
-        derivative_stencil: (M, 2, 18) float64, weights of the differences to the ``ring_markers`` that give the
-            map's derivatives (least squares of a cubic) where all 18 exist; else 0.
+        derivative_stencil: (M, 5, 18) float64, weights of the differences to the ``ring_markers`` that give the
+            map's derivatives x, y, xx, xy, yy (least squares of a cubic) where all 18 exist; else 0.
         edge_vectors: (E, 2) float64, from an edge's start to its end, in the unit of ``ring_vectors``.
         next_markers: (E, 2) int32, on the same gridline the marker before an edge's start and the one after its end.
         third_differences: (E, 2) float64, the layout's third difference along these four markers, in the unit of
@@ -169,14 +170,14 @@ def _two_rings(ring: NDArray[np.int32]) -> NDArray[np.int32]:
 def _derivative_stencil(
     ring_markers: NDArray[np.int32], ring_vectors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(M, 2, 18) float64, see ``Topology.derivative_stencil``."""
+    """(M, 5, 18) float64, see ``Topology.derivative_stencil``."""
     x, y = ring_vectors[..., 0], ring_vectors[..., 1]
-    terms = np.stack([x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y], axis=2)
-    stencil = np.zeros((len(ring_markers), 2, MAX_RING_MARKERS))
+    terms = np.stack([x, y, x * x / 2, x * y, y * y / 2, x * x * x, x * x * y, x * y * y, y * y * y], axis=2)
+    stencil = np.zeros((len(ring_markers), MAP_DERIVATIVES, MAX_RING_MARKERS))
     full = (ring_markers >= 0).all(axis=1)
     terms = terms[full]
     gram = np.swapaxes(terms, 1, 2) @ terms
     regular = np.linalg.cond(gram) < MAX_CONDITION if len(gram) else np.empty(0, np.bool_)
-    solutions = np.linalg.solve(gram[regular], np.swapaxes(terms[regular], 1, 2))[:, :2]
+    solutions = np.linalg.solve(gram[regular], np.swapaxes(terms[regular], 1, 2))[:, :MAP_DERIVATIVES]
     stencil[np.flatnonzero(full)[regular]] = solutions
     return stencil

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.measure.gridline_offsets import GridlineReading
+from extractor.refine.measure.marker_scatter import NO_SCATTER, MarkerScatter
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.ink_levels import InkLevels, level_change
 
@@ -66,6 +67,7 @@ class RefinedMarkers:
         noise: the noise found, gray levels, one channel.
         appearance: how the image looks; None where the pattern was not drawn.
         points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
+        scatter: of the markers, each by itself.
     """
 
     xy_px: NDArray[np.float64]
@@ -75,13 +77,14 @@ class RefinedMarkers:
     noise: float
     appearance: Appearance | None
     points: NDArray[np.float64]
+    scatter: MarkerScatter
 
 
 class PatternState(NamedTuple):
     """Where the pattern is thought to be: the part of an ``Estimate`` that compiled functions take.
 
     Attributes:
-        xy, hidden, maps, roughness, bend, sigma, noise, dot_gain: as in ``Estimate``.
+        xy, hidden, maps, roughness, bend, sigma, noise, dot_gain, scatter: as in ``Estimate``.
         weight: (E,) 0 to 1, the weights of the gridlines in the last step.
     """
 
@@ -94,6 +97,7 @@ class PatternState(NamedTuple):
     sigma: float
     noise: float
     dot_gain: float
+    scatter: MarkerScatter
 
 
 class Estimate(NamedTuple):
@@ -116,6 +120,7 @@ class Estimate(NamedTuple):
         bend: (E, 2) px, how far they bend.
         reading: what that step compared with the image; None before the first step.
         dot_gain: how far the sides of all cells have moved outward, px.
+        scatter: of the markers, each by itself.
         convergence_cov_px2: (M, 2, 2) the error that the last step may have left; None where nothing is drawn.
     """
 
@@ -134,13 +139,14 @@ class Estimate(NamedTuple):
     bend: NDArray[np.float64]
     reading: GridlineReading | None
     dot_gain: float = 0.0
+    scatter: MarkerScatter = NO_SCATTER
     convergence_cov_px2: NDArray[np.float64] | None = None
 
     def pattern_state(self) -> PatternState:
         """The part that compiled functions take; all weights are 1 before the first step."""
         weight = np.ones(len(self.bend)) if self.reading is None else self.reading.weight
         where = self.xy, self.hidden, self.maps, self.roughness, self.bend
-        return PatternState(*where, weight, self.sigma, self.noise, self.dot_gain)
+        return PatternState(*where, weight, self.sigma, self.noise, self.dot_gain, self.scatter)
 
 
 class EdgeContrasts(NamedTuple):

@@ -14,6 +14,7 @@ from extractor.refine.measure.gridline_bending import LIMITS as BENDING_LIMITS
 from extractor.refine.measure.gridline_bending import BendingLimits, MarkerRows, measure_roughness
 from extractor.refine.measure.gridline_weights import LIMITS as WEIGHT_LIMITS
 from extractor.refine.measure.gridline_weights import GridlineWeightLimits
+from extractor.refine.measure.marker_scatter import measure_scatter
 from extractor.refine.solve.disagreement import LIMITS as DISAGREEMENT_LIMITS
 from extractor.refine.solve.disagreement import DisagreementLimits
 from extractor.refine.solve.fisher_information import LIMITS as INFORMATION_LIMITS
@@ -95,18 +96,19 @@ def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
     return estimate._replace(**extrapolate_pattern(estimate.reliable, topology)._asdict())
 
 
-def with_roughness(topology: Topology, estimate: Estimate) -> Estimate:
-    """The estimate with the roughness of its markers."""
+def with_roughness(topology: Topology, estimate: Estimate, *, by_synthesis: bool) -> Estimate:
+    """The estimate with roughness and scatter of its markers, which a step by synthesis has placed, or profiles."""
     rows = MarkerRows(topology.edges, topology.next_markers, topology.third_differences)
     about = rows, topology.spokes, topology.ring_markers
     markers = estimate.reliable, estimate.maps, estimate.information.diagonal
-    return estimate._replace(roughness=measure_roughness(*markers, *about))
+    scatter = measure_scatter(*markers, topology, by_synthesis=by_synthesis)
+    return estimate._replace(roughness=measure_roughness(*markers, *about), scatter=scatter)
 
 
 def gridlines_of(topology: Topology, estimate: Estimate) -> NDArray[np.float64]:
     """(E, 8) the gridlines of the estimate."""
     where = estimate.xy, estimate.maps, estimate.bend
-    return np.asarray(gridlines(*where, topology.edges, topology.edge_vectors))
+    return np.asarray(gridlines(*where, topology.edges, topology.edge_vectors, estimate.scatter.share))
 
 
 def step_solution(

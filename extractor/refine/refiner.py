@@ -198,7 +198,8 @@ class Refiner:
             places = replace(places, xy_px=xy)
         start = with_pattern_moved(topology, estimate)
         if estimate.sigma < schedule.sharp_blur_share * edge_px:
-            return self._final_profiles(view, with_roughness(topology, start), contrasts, places)
+            start = with_roughness(topology, start, by_synthesis=False)
+            return self._final_profiles(view, start, contrasts, places)
         usual_px = median_edge(start.xy, topology.edges)
         estimate = self._synthesis_solver.steps(view, start, schedule, usual_px)
         return self._accept_or_recover(view, estimate, contrasts, places)
@@ -253,7 +254,9 @@ class Refiner:
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look) if reading.drawn else None
         blur, noise = scale * estimate.sigma, scale * estimate.noise
-        return RefinedMarkers(xy, cov, explained, blur, noise, appearance, points)
+        return RefinedMarkers(
+            xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)
+        )
 
     def _accepted_markers(
         self, estimate: Estimate, places: InitialMarkers
@@ -289,6 +292,7 @@ def rescaled(estimate: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estim
         pixel_noise=max(ratio * estimate.pixel_noise, MIN_NOISE),
         levels=estimate.levels._replace(slope=estimate.levels.slope / ratio),
         bend=ratio * estimate.bend,
+        scatter=estimate.scatter.at_scale(ratio),
         information=Information(blocks.diagonal / ratio**2, blocks.off_diagonal / ratio**2),
     )
 

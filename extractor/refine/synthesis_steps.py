@@ -15,6 +15,7 @@ from extractor.presets import Schedule
 from extractor.refine.drawn_pattern import Synthesis, draw_pattern
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_offsets import GridlineReading
+from extractor.refine.measure.marker_scatter import NO_SCATTER
 from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
@@ -123,7 +124,7 @@ class SynthesisSolver:
             if step > 0:
                 estimate = with_pattern_moved(self._topology, estimate)
             judged = step > 0  # the misfit of the first step is that of its start
-            stepped, drawing = self._full_step(view, self._with_bending(estimate, wide_blur), judged)
+            stepped, drawing = self._full_step(view, self._with_bending(estimate, wide_blur, judged), judged)
             estimate = _overlap_corrected(stepped, drawing)
             shift = estimate.measured - drawing.xy
             if judged and typical_move(shift, estimate.information) < schedule.small_move:
@@ -132,12 +133,14 @@ class SynthesisSolver:
         cov = convergence_covariance(estimate.measured - drawing.xy, drawing.sigma, remaining)
         return estimate._replace(convergence_cov_px2=cov)
 
-    def _with_bending(self, estimate: Estimate, wide_blur: bool) -> Estimate:
-        """The estimate with the roughness that lets its gridlines bend; with none where the blur is wide.
+    def _with_bending(self, estimate: Estimate, wide_blur: bool, judged: bool) -> Estimate:
+        """The estimate with the roughness and the scatter that let its gridlines bend; with none where blur is wide.
 
         There the gridlines would take up the error of the markers beside them, which would hardly move.
         """
-        return _without_bending(estimate) if wide_blur else with_roughness(self._topology, estimate)
+        if wide_blur:
+            return _without_bending(estimate)
+        return with_roughness(self._topology, estimate, by_synthesis=judged)
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate, judged: bool) -> tuple[Estimate, Synthesis]:
         """A step from everything."""
@@ -171,7 +174,7 @@ class SynthesisSolver:
 def _without_bending(estimate: Estimate) -> Estimate:
     """The estimate with gridlines that may not bend."""
     roughness, bend = np.zeros_like(estimate.roughness), np.zeros_like(estimate.bend)
-    return estimate._replace(roughness=roughness, bend=bend)
+    return estimate._replace(roughness=roughness, bend=bend, scatter=NO_SCATTER)
 
 
 def _overlap_corrected(estimate: Estimate, drawing: Synthesis) -> Estimate:

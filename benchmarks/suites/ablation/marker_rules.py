@@ -72,6 +72,22 @@ REFINEMENT = (
         "typical_move(shift, estimate.information) < schedule.small_move",
         "typical_move(shift, estimate.information) < 0.0",
     ),
+    Rule(
+        "scatter",
+        "where markers lie by themselves off the smooth map, gridlines do not curve as its tangents say",
+        "accuracy",
+        "extractor/refine/measure/marker_scatter.py",
+        "return MarkerScatter(*found)",
+        "return NO_SCATTER",
+    ),
+    Rule(
+        "scatter of profiles",
+        "what profiles leave is not taken for scatter",
+        "accuracy",
+        "extractor/refine/measure/marker_scatter.py",
+        "start_allowance: float = 100.0",
+        "start_allowance: float = 2.0",
+    ),
 )
 
 COMPLETE = (

@@ -32,6 +32,21 @@ Vector edge_tangent(const GridlineEnds& ends, const layout::Topology& topology, 
   return chord;
 }
 
+// The second derivatives of the map at marker m along edge e, px; 0 where they are unknown.
+Vector curvature(const GridlineEnds& ends, const layout::Topology& topology, Index m, Index e) {
+  const auto map = ends.maps[m];
+  const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
+  const double x = u * u * map(0, 2) + 2 * u * v * map(0, 3) + v * v * map(0, 4);
+  const double y = u * u * map(1, 2) + 2 * u * v * map(1, 3) + v * v * map(1, 4);
+  return std::isfinite(x) && std::isfinite(y) ? Vector{x, y} : Vector{0.0, 0.0};
+}
+
+// Moves a tangent towards that of the cubic with the second derivatives `near` and `far` of both ends.
+void update_for_scatter(Vector& tangent, Vector chord, Vector near, Vector far, double share) {
+  tangent.x += share * (chord.x - (2 * near.x + far.x) / 6 - tangent.x);
+  tangent.y += share * (chord.y - (2 * near.y + far.y) / 6 - tangent.y);
+}
+
 // A virtual marker from the start of its edge: place, covariance and status.
 struct Located {
   double x, y, xx, cross, yy;
@@ -44,7 +59,7 @@ struct Gridline {
   Vector chord, along, leaving, arriving;
   View<const double, 2> cov_a, cov_b;
 
-  Gridline(const GridlineEnds& ends, const layout::Topology& topology, Index a, Index b)
+  Gridline(const GridlineEnds& ends, const layout::Topology& topology, Index e, Index a, Index b)
       : x0(ends.xy_px(a, 0)),
         y0(ends.xy_px(a, 1)),
         chord{ends.xy_px(b, 0) - x0, ends.xy_px(b, 1) - y0},
@@ -54,16 +69,21 @@ struct Gridline {
     along = {chord.x / length, chord.y / length};
     leaving = edge_tangent(ends, topology, a, b, chord);
     arriving = edge_tangent(ends, topology, b, a, {-chord.x, -chord.y});
+    if (ends.scatter.share == 0.0) return;
+    const Vector at_a = curvature(ends, topology, a, e), at_b = curvature(ends, topology, b, e);
+    update_for_scatter(leaving, chord, at_a, at_b, ends.scatter.share);
+    update_for_scatter(arriving, {-chord.x, -chord.y}, at_b, at_a, ends.scatter.share);
   }
 
   // the interpolated point at the share t of the edge
-  Located at(double t, double bend_uncertainty) const {
+  Located at(double t, double bend_uncertainty, double free_variance) const {
     const double s = 1.0 - t;
     const double end = t * t * (3 - 2 * t), slope_a = s * s * t, slope_b = s * t * t;
     const double x = end * chord.x + slope_a * leaving.x + slope_b * arriving.x;
     const double y = end * chord.y + slope_a * leaving.y + slope_b * arriving.y;
     const double bend_variance =
-        square(bend_uncertainty) * (square(x - t * chord.x) + square(y - t * chord.y));
+        square(bend_uncertainty) * (square(x - t * chord.x) + square(y - t * chord.y)) +
+        square(s * t) * free_variance;
     return {x,
             y,
             s * s * cov_a(0, 0) + t * t * cov_b(0, 0) + bend_variance,
@@ -96,14 +116,15 @@ VirtualMarkers locate_on_edges(const GridlineEnds& ends, const layout::Topology&
   Array<double, 3> xy({count, m, 2}, NOT_A_NUMBER);
   Array<double, 4> cov({count, m, 2, 2}, NOT_A_NUMBER);
   Array<std::uint8_t, 2> status({count, m}, LOST);
+  const double free_variance = limits.bend_by_scatter * ends.scatter.variance;
   for (Index e = 0; e < count; ++e) {
     const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
     if (!(ends.known[a] && ends.known[b])) continue;
-    const Gridline gridline(ends, topology, a, b);
+    const Gridline gridline(ends, topology, e, a, b);
     const double limit_px = limits.max_measured_offset * gridline.length;
     for (Index j = 0; j < m; ++j) {
       const double t = static_cast<double>(j + 1) / static_cast<double>(m + 1);
-      Located point = gridline.at(t, limits.bend_uncertainty);
+      Located point = gridline.at(t, limits.bend_uncertainty, free_variance);
       gridline.update_to_measured(points[e][j], limit_px, point);
       status(e, j) = point.status;
       xy(e, j, 0) = gridline.x0 + point.x;

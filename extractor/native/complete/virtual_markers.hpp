@@ -8,16 +8,17 @@
 
 #include "base/array.hpp"
 #include "layout/topology.hpp"
+#include "refine/measure/marker_scatter.hpp"
 
 namespace cmp::complete {
 
 // Limits of virtual markers; explained in extractor/complete/virtual_markers.py.
 struct VirtualLimits {
-  double max_measured_offset, bend_uncertainty;
+  double max_measured_offset, bend_uncertainty, bend_by_scatter;
 
   template <class F>
   static VirtualLimits read(const F& f) {
-    return {f["max_measured_offset"], f["bend_uncertainty"]};
+    return {f["max_measured_offset"], f["bend_uncertainty"], f["bend_by_scatter"]};
   }
 };
 
@@ -27,10 +28,11 @@ struct GridlineEnds {
   View<const double, 3> cov_px2;  // (M, 2, 2)
   View<const bool, 1> known;      // (M,)
   View<const double, 3> maps;     // (M, 2, 5) the local map at each marker
+  refine::MarkerScatter scatter;
 
   template <class F>
   static GridlineEnds read(const F& f) {
-    return {f["xy_px"], f["cov_px2"], f["known"], f["maps"]};
+    return {f["xy_px"], f["cov_px2"], f["known"], f["maps"], f["scatter"]};
   }
 };
 

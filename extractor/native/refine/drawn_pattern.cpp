@@ -48,8 +48,8 @@ DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topolog
   const auto cells = topology.cells, edges = topology.edges, edge_cells = topology.edge_cells;
   const double sigma = state.sigma;
   const auto& frame = view.frame;
-  Array<double, 2> lines =
-      gridlines(xy, state.maps, state.bend, edges, topology.edge_vectors, limits.gridlines);
+  Array<double, 2> lines = gridlines(xy, state.maps, state.bend, edges, topology.edge_vectors,
+                                     state.scatter.share, limits.gridlines);
   Array<double, 2> sides = gridline_sides(lines, xy, cells, edge_cells, levels, frame);
   fill_zeros(picture, box);
   draw_cells({xy, cells, topology.cell_edges, edges, lines}, {levels.cell, levels.slope, sigma}, box,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/array.hpp"
+#include "refine/measure/marker_scatter.hpp"
 
 namespace cmp::refine {
 
@@ -16,11 +17,12 @@ struct PatternState {
   double sigma;                     // the blur, px
   double noise;                     // gray levels, one channel
   double dot_gain;                  // px
+  MarkerScatter scatter;
 
   template <class F>
   static PatternState read(const F& f) {
     return {f["xy"],     f["hidden"], f["maps"],  f["roughness"], f["bend"],
-            f["weight"], f["sigma"],  f["noise"], f["dot_gain"]};
+            f["weight"], f["sigma"],  f["noise"], f["dot_gain"],  f["scatter"]};
   }
 };
 

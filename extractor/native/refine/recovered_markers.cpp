@@ -77,8 +77,9 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
   const Array<double, 2> sides = selected_rows(contrasts.sides, numbers);
   const Array<double, 2> across = selected_rows(contrasts.contrasts, numbers);
   const Array<double, 2> clearance = selected_rows(contrasts.clearance, numbers);
-  Array<double, 2> lines = gridlines(state.xy, state.maps, bend, ends,
-                                     selected_rows(topology.edge_vectors, numbers), limits.gridlines);
+  Array<double, 2> lines =
+      gridlines(state.xy, state.maps, bend, ends, selected_rows(topology.edge_vectors, numbers),
+                state.scatter.share, limits.gridlines);
   const Array<bool, 1> bending = bending_gridlines(state.roughness, bend, ends);
   Array<double, 2> sums = read_profiles(view, lines, {sides, across, clearance}, state.sigma, bending,
                                         limits.stations, limits.profiles.rows);
@@ -86,8 +87,9 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
   update_without_dot_gain(sums, gradients, across, selected_rows(topology.edge_cells, numbers),
                           state.dot_gain);
   const Array<double, 1> weight = selected_items(state.weight, numbers);
-  EliminatedBending bent = update_for_bending(sums, gradients, {bend, state.roughness, weight}, lines, ends,
-                                              state.noise, limits.profiles.rule, limits.profiles.step);
+  EliminatedBending bent =
+      update_for_bending(sums, gradients, {bend, state.roughness, weight, state.scatter.variance}, lines,
+                         ends, state.noise, limits.profiles.rule, limits.profiles.step);
   Array<double, 1> profile_weight = profile_weights(sums, gradients, clearance, read.count, limits);
   return {std::move(lines), std::move(sums), std::move(gradients), std::move(profile_weight),
           std::move(bent.variance)};
@@ -145,7 +147,8 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
                               own.ends,
                               own.spokes,
                               state.sigma,
-                              state.noise * state.noise};
+                              state.noise * state.noise,
+                              state.scatter.share};
   const InformationArrays information = fisher_information(system, prior, false, step.information);
   const Array<double, 2> measured = shifted_markers(
       system, information, read.gradients.start.slice(0, count), read.gradients.end.slice(0, count),

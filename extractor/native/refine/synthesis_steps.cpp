@@ -19,15 +19,17 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   const double dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma, limits.dot_gain);
   Array<double, 1> dot_gain_offset =
       update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
-  EliminatedBending bent = update_for_bending(sums, gradients, {drawing.bend, state.roughness, state.weight},
-                                              lines, edges, state.noise, rule, limits.step);
+  EliminatedBending bent = update_for_bending(
+      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter.variance}, lines, edges,
+      state.noise, rule, limits.step);
   const Array<double, 1> pardon = bending_misfit(bent.variance, contrasts, sigma, limits.step.bending);
   GridlineWeights weighed =
       weigh_gridlines(sums, gradients, pardon, static_cast<double>(rule.values),
                       static_cast<double>(rule.min_places), rule.default_weight, weights);
   const double noise = std::isfinite(weighed.noise) ? weighed.noise : state.noise;
-  const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,
-                              edges, topology.spokes, sigma, noise * noise};
+  const GridlineSystem system{sums,      weighed.weight, lines,
+                              contrasts, edges,          topology.spokes,
+                              sigma,     noise * noise,  state.scatter.share};
   WeighedSolution solved = solve_weighed(system, gradients, drawing.bend, bent.response,
                                          {state.xy, state.hidden}, true, judged, limits.step);
   return {std::move(weighed.weight),

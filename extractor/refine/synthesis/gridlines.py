@@ -3,6 +3,9 @@
 Gridlines are straight in the layout; the map to the image curves them. The map's derivative at every marker is
 estimated from the two rings of neighbours, and gives the direction of each gridline at that marker. The gridline is the
 cubic between two markers with these directions, as a C1-smooth interpolation of the map (Clough-Tocher) has it.
+
+Where markers scatter, each by itself, the directions are wrong, and the sides of cells stay straight. There a gridline
+curves as the map's second derivatives say (``marker_scatter``).
 """
 
 from __future__ import annotations
@@ -42,16 +45,15 @@ def local_maps(
 ) -> NDArray[np.float64]:
     """The local map at each marker.
 
-    Where both rings are complete, the first derivatives are those of a cubic, and the second are 0, as they are not
-    used. Elsewhere they are those of a quadratic, whose second derivatives are regularised towards 0 and are 0 where
-    fewer than five neighbours are known.
+    Where both rings are complete, the derivatives are those of a cubic. Elsewhere they are those of a quadratic, whose
+    second derivatives are regularised towards 0 and are 0 where fewer than five neighbours are known.
 
     Args:
         xy: (M, 2) px, NaN where unknown.
         near, offset, stencil: ``ring_markers``, ``ring_vectors`` and ``derivative_stencil`` of ``Topology``.
 
     Returns:
-        (M, 2, 5): derivatives of x and y by the layout's x, y, xx / 2, xy, yy / 2; NaN where unknown.
+        (M, 2, 5): derivatives of x and y by the layout's x, y, xx, xy, yy; NaN where unknown.
     """
     return np.asarray(native.local_maps(xy, near, offset, stencil, LIMITS))
 
@@ -62,6 +64,7 @@ def gridlines(
     bend: NDArray[np.float64],
     edges: NDArray[np.int32],
     along: NDArray[np.float64],
+    scatter_share: float,
 ) -> NDArray[np.float64]:
     """The gridlines between markers.
 
@@ -69,9 +72,11 @@ def gridlines(
         xy: (M, 2) px, the markers. maps: (M, 2, 5), as ``local_maps`` gives them.
         bend: (E, 2) px, b and s of ``gridline_bending``, which add to the slopes.
         edges: (E, 2) marker ids. along: (E, 2) ``Topology.edge_vectors``.
+        scatter_share: 0 to 1, how far slopes go from those of the maps' tangents to those of the cubic that has the
+            maps' second derivatives at both ends.
 
     Returns:
         (E, 8): start and unit vector of the chord, its length, px; slopes against the chord at both ends, towards
         (-uy, ux); 1 where known. All 0 where unknown.
     """
-    return np.asarray(native.gridlines(xy, maps, bend, edges, along, LIMITS))
+    return np.asarray(native.gridlines(xy, maps, bend, edges, along, scatter_share, LIMITS))

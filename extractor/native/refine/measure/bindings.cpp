@@ -4,12 +4,15 @@
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/measure/gridline_offsets.hpp"
 #include "refine/measure/gridline_weights.hpp"
+#include "refine/measure/marker_scatter.hpp"
 
 namespace cmp::refine {
 
 void add_measure(nb::module_ module) {
   bind<&measure_roughness>(module, "measure_roughness",
                            {"xy", "maps", "diagonal", "rows", "spokes", "near", "limits"});
+  bind<&measure_scatter>(module, "measure_scatter",
+                         {"xy", "maps", "diagonal", "topology", "by_synthesis", "limits"});
   bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count", "limits"});
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
   bind<&short_edges>(module, "short_edges", {"xy", "edges", "rarity", "other_rarity"});

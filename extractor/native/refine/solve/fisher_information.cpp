@@ -90,7 +90,8 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     diagonal(m, 0) = diagonal(m, 2) = prior[m];
     diagonal(m, 1) = 0.0;
   }
-  const double own = 1.0 + limits.smooth_map_coupling, between = 1.0 - limits.smooth_map_coupling;
+  const double coupling = limits.smooth_map_coupling * (1.0 - system.scatter_share);
+  const double own = 1.0 + coupling, between = 1.0 - coupling;
   for (Index e = 0; e < edges.size(); ++e) {
     const double w = system.weight[e] * lines(e, KNOWN) / system.variance;
     if (w == 0.0) continue;

@@ -34,6 +34,7 @@ struct GridlineSystem {
   View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
   double sigma;                        // the blur, px
   double variance;                     // of the noise, squared gray levels, one channel
+  double scatter_share;                // 0 to 1, as in MarkerScatter
 };
 
 // Limits of the information; explained in extractor/refine/solve/fisher_information.py.

@@ -9,7 +9,7 @@
 namespace cmp::refine {
 
 void add_synthesis(nb::module_ module) {
-  bind<&gridlines>(module, "gridlines", {"xy", "maps", "bend", "edges", "along", "limits"});
+  bind<&gridlines>(module, "gridlines", {"xy", "maps", "bend", "edges", "along", "scatter_share", "limits"});
   bind<&local_maps>(module, "local_maps", {"xy", "near", "offset", "stencil", "limits"});
   bind<&level_change>(module, "level_change", {"before", "now"});
   bind<&remove_bleed>(module, "remove_bleed", {"levels", "color", "share", "median_share", "limits"});

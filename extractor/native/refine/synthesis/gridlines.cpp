@@ -7,28 +7,25 @@ namespace cmp::refine {
 
 namespace {
 
+constexpr Index DERIVATIVES = 5;
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-// The first derivatives of x and y by the layout's x (u) and y (v).
-struct FirstDerivatives {
-  double xu, xv, yu, yv;
-};
-
-// NaN where a neighbour is unknown. near (K,), stencil (2, K).
-FirstDerivatives cubic_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
-                                   View<const double, 2> stencil) {
-  const auto to_u = stencil[0], to_v = stencil[1];
-  const double x = xy(m, 0), y = xy(m, 1);
-  double xu = 0.0, xv = 0.0, yu = 0.0, yv = 0.0;
+// Writes the map (2, 5) at marker m; NaN where a neighbour is unknown. near (K,), stencil (5, K).
+void fill_cubic_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
+                            View<const double, 2> stencil, View<double, 2> out) {
+  std::array<double, DERIVATIVES> to_x{}, to_y{};
   for (Index k = 0; k < near.size(); ++k) {
     const Index n = near[k];
-    const double dx = xy(n, 0) - x, dy = xy(n, 1) - y, u = to_u[k], v = to_v[k];
-    xu += u * dx;
-    xv += v * dx;
-    yu += u * dy;
-    yv += v * dy;
+    const double dx = xy(n, 0) - xy(m, 0), dy = xy(n, 1) - xy(m, 1);
+    for (Index d = 0; d < DERIVATIVES; ++d) {
+      to_x[d] += stencil(d, k) * dx;
+      to_y[d] += stencil(d, k) * dy;
+    }
   }
-  return {xu, xv, yu, yv};
+  for (Index d = 0; d < DERIVATIVES; ++d) {
+    out(0, d) = to_x[d];
+    out(1, d) = to_y[d];
+  }
 }
 
 // The slope of a gridline, `along` (2,) in the layout, against its chord (ux, uy) at a marker with a map (2,
@@ -49,6 +46,15 @@ double mapped(double place, View<const double, 1> map, double u, double v) {
 
 double curvature(View<const double, 1> map, double u, double v) {
   return 0.5 * u * u * map[2] + u * v * map[3] + 0.5 * v * v * map[4];
+}
+
+// How far a gridline, `along` (2,) in the layout, curves to the normal of its chord (ux, uy) by the map (2,
+// 5) at a marker, px: its second derivative by the share of the chord; 0 where the map is unknown.
+double curved_by(View<const double, 2> map, View<const double, 1> along, double ux, double uy) {
+  const double x = 2.0 * curvature(map[0], along[0], along[1]);
+  const double y = 2.0 * curvature(map[1], along[0], along[1]);
+  const double normal = y * ux - x * uy;
+  return std::isfinite(normal) ? normal : 0.0;
 }
 
 }  // namespace
@@ -72,15 +78,9 @@ Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> whi
     if (!which[m]) continue;
     // the stencil has weights where both rings are complete
     const bool is_complete = stencil(m, 0, 0) != 0.0 || stencil(m, 0, 1) != 0.0;
-    const FirstDerivatives first = is_complete ? cubic_derivatives(xy, m, near[m], stencil[m])
-                                               : FirstDerivatives{NOT_A_NUMBER, 0.0, 0.0, 0.0};
-    if (std::isfinite(first.xu)) {
-      out[m].fill(0.0);
-      out(m, 0, 0) = first.xu;
-      out(m, 0, 1) = first.xv;
-      out(m, 1, 0) = first.yu;
-      out(m, 1, 1) = first.yv;
-    } else {
+    if (is_complete) fill_cubic_derivatives(xy, m, near[m], stencil[m], out[m]);
+    if (!std::isfinite(out(m, 0, 0))) {
+      out[m].fill(NOT_A_NUMBER);
       incomplete[count++] = m;
     }
   }
@@ -140,7 +140,7 @@ Array<double, 2> extrapolate_rings(View<const double, 2> xy, View<const std::int
 
 Array<double, 2> gridlines(View<const double, 2> xy, View<const double, 3> maps, View<const double, 2> bend,
                            View<const std::int32_t, 2> edges, View<const double, 2> along,
-                           const GridlineLimits& limits) {
+                           double scatter_share, const GridlineLimits& limits) {
   Array<double, 2> out({edges.size(), LINE_COLUMNS}, 0.0);
   for (Index e = 0; e < edges.size(); ++e) {
     const Index a = edges(e, 0), b = edges(e, 1);
@@ -154,6 +154,12 @@ Array<double, 2> gridlines(View<const double, 2> xy, View<const double, 3> maps,
     if (!std::isfinite(arrive)) arrive = -leave;
     if (!std::isfinite(leave)) leave = -arrive;
     if (!std::isfinite(leave)) leave = arrive = 0.0;
+    if (scatter_share > 0.0) {
+      // the cubic with the second derivatives of both ends
+      const double at_a = curved_by(maps[a], along[e], ux, uy), at_b = curved_by(maps[b], along[e], ux, uy);
+      leave += scatter_share * (-(2.0 * at_a + at_b) / (6.0 * length) - leave);
+      arrive += scatter_share * ((at_a + 2.0 * at_b) / (6.0 * length) - arrive);
+    }
     const auto line = out[e];
     line[X] = xy(a, 0);
     line[Y] = xy(a, 1);

@@ -34,13 +34,13 @@ struct ExtrapolatedMarkers {
   Array<bool, 1> predicted;
 };
 
-// (M, 2, 5), the local map at each marker: derivatives of x and y by the layout's x, y, xx / 2, xy, yy / 2;
+// (M, 2, 5), the local map at each marker: derivatives of x and y by the layout's x, y, xx, xy, yy;
 // NaN where unknown.
 //
-// Where both rings are complete, the first derivatives are those of a cubic, and the second are 0, as they
-// are not used. Elsewhere they are those of a quadratic, whose second derivatives are regularised towards 0
-// and are 0 where fewer than five neighbours are known. xy (M, 2) px, NaN where unknown; near, offset and
-// stencil: ring_markers, ring_vectors and derivative_stencil of the topology.
+// Where both rings are complete, the derivatives are those of a cubic. Elsewhere they are those of a
+// quadratic, whose second derivatives are regularised towards 0 and are 0 where fewer than five neighbours
+// are known. xy (M, 2) px, NaN where unknown; near, offset and stencil: ring_markers, ring_vectors and
+// derivative_stencil of the topology.
 Array<double, 3> local_maps(View<const double, 2> xy, View<const std::int32_t, 2> near,
                             View<const double, 3> offset, View<const double, 3> stencil,
                             const GridlineLimits& limits);
@@ -65,10 +65,11 @@ Array<double, 2> extrapolate_rings(View<const double, 2> xy, View<const std::int
 // (-uy, ux); 1 where known. All 0 where unknown.
 //
 // xy (M, 2) px; maps (M, 2, 5), as local_maps gives them; bend (E, 2) px, b and s of the gridlines' bending,
-// which add to the slopes; edges (E, 2) marker ids; along (E, 2), the topology's edge_vectors.
+// which add to the slopes; edges (E, 2) marker ids; along (E, 2), the topology's edge_vectors; scatter_share
+// 0 to 1, how far slopes go from the maps' tangents to the cubic with the maps' second derivatives.
 Array<double, 2> gridlines(View<const double, 2> xy, View<const double, 3> maps, View<const double, 2> bend,
                            View<const std::int32_t, 2> edges, View<const double, 2> along,
-                           const GridlineLimits& limits);
+                           double scatter_share, const GridlineLimits& limits);
 
 // px, the offset of a gridline from its chord at the fraction t of the chord; straight beyond the ends.
 inline double sagitta(double t, double length, double leave, double arrive) {

@@ -1,0 +1,43 @@
+// The scatter of the markers: how far each lies off a smooth map by itself.
+#pragma once
+
+#include <tuple>
+
+#include "base/array.hpp"
+#include "layout/topology.hpp"
+
+namespace cmp::refine {
+
+// Independent scatter of the markers of a picture, each by itself.
+struct MarkerScatter {
+  double variance;  // px^2, one axis
+  double share;     // 0 to 1, of the variance of the fourth differences
+
+  template <class F>
+  static MarkerScatter read(const F& f) {
+    return {f["variance_px2"], f["share"]};
+  }
+};
+
+// Limits of scatter; explained in extractor/refine/measure/marker_scatter.py.
+struct ScatterLimits {
+  double smooth_ratio, noise_allowance, start_allowance, quantile;
+
+  template <class F>
+  static ScatterLimits read(const F& f) {
+    return {f["smooth_ratio"], f["noise_allowance"], f["start_allowance"], f["quantile"]};
+  }
+};
+
+// variance and share of MarkerScatter.
+using ScatterFigures = std::tuple<double, double>;
+
+// The scatter, from the third and fourth differences of the markers along their gridlines.
+//
+// xy (M, 2) px, NaN where unknown; maps (M, 2, 5), as local_maps gives them; diagonal (M, 3) 1/px^2, the
+// information's diagonal blocks; by_synthesis, a step by synthesis has placed the markers.
+ScatterFigures measure_scatter(View<const double, 2> xy, View<const double, 3> maps,
+                               View<const double, 2> diagonal, const layout::Topology& topology,
+                               bool by_synthesis, const ScatterLimits& limits);
+
+}  // namespace cmp::refine

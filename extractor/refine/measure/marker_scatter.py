@@ -1,0 +1,97 @@
+"""Scatter of the markers: how far each lies by itself off the smooth map that all of them define.
+
+Castings scatter. Where a marker lies off by itself, the sides of its cells stay straight, and the tangents of a map
+through such markers are wrong by as much as the markers scatter. The differences of markers along their gridlines tell
+scatter from bending. Independent scatter of variance v per axis gives third differences (1, 3, 3, 1) a variance of
+20 v, and fourth ones (1, 4, 6, 4, 1) of 70 v. Where a map bends, its fourth differences are smaller against its third
+ones. With r the largest ratio of both variances there,
+
+    v = (fourth - r third) / (70 - 20 r) - noise,
+
+where both variances are by the lower quartile of all gridlines of the picture: rims, slips and dirt do not count. The
+share of v in the fourth differences, 70 v / fourth (by their median), is how far the prior of a gridline's shape goes
+from the tangents of the map to its second derivatives, whose error by scatter is a fifth of that of the tangents. That
+error is the least variance of the gridline's bending.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor._native import measure as native
+from extractor.layout.topology import Topology
+
+# The variance of b (see ``gridline_bending``) of the cubics with second derivatives of the map, over that of the
+# scatter: the mean over the gridlines of patterns of 11 layers (397 markers), by Monte Carlo. It is 0.056 where
+# both rings of both ends are complete, and 0.36 along the rim.
+BEND_BY_SCATTER = 0.14
+
+
+class MarkerScatter(NamedTuple):
+    """Independent scatter of the markers of a picture.
+
+    Attributes:
+        variance_px2: px^2, of one axis.
+        share: 0 to 1, of the variance of the fourth differences.
+    """
+
+    variance_px2: float
+    share: float
+
+    def at_scale(self, scale: float) -> MarkerScatter:
+        """The scatter in an image that is larger by the factor ``scale``."""
+        return self._replace(variance_px2=scale**2 * self.variance_px2)
+
+
+NO_SCATTER = MarkerScatter(0.0, 0.0)
+
+
+class ScatterLimits(NamedTuple):
+    """Limits of the scatter.
+
+    Attributes:
+        smooth_ratio: variance of fourth differences over that of third ones, at most, where nothing scatters. On bulges
+            and twists of the suite "plain" it is 0.14 to 0.41 (`python -m benchmarks.calibration --suite plain`). With
+            0.3, dents and balls on patterns of 4 and 6 layers (`tests/extractor/refine/test_bending.py`) were taken for
+            scatter; with 1.5 hardly any are, and their errors do not rise.
+        noise_allowance: stated variances of a marker that are noise, not scatter. On the flat patterns of that suite
+            fourth differences ask for 1.0 to 1.5, in steep views for 7 after the first step; a scatter of 0.05 px makes
+            40 to 60.
+        start_allowance: the same before the first step by synthesis, where markers are as profiles left them: dirt of
+            the suite "damage" asks for up to 61 there.
+        quantile: of the squared differences, by which their variance is measured: scatter is everywhere, and rims,
+            slips and dirt are somewhere. By the median, a slip of a tenth of an edge on a pattern of 4 layers was taken
+            for scatter, and its errors rose by a half.
+    """
+
+    smooth_ratio: float = 1.5
+    noise_allowance: float = 8.0
+    start_allowance: float = 100.0
+    quantile: float = 0.25
+
+
+LIMITS = ScatterLimits()
+
+
+def measure_scatter(
+    xy: NDArray[np.float64],
+    maps: NDArray[np.float64],
+    diagonal: NDArray[np.float64],
+    topology: Topology,
+    *,
+    by_synthesis: bool,
+) -> MarkerScatter:
+    """The scatter of the markers of a picture.
+
+    Args:
+        xy: (M, 2) px, the markers, NaN where unknown.
+        maps: (M, 2, 5), as ``local_maps`` gives them.
+        diagonal: (M, 3) 1/px^2, the information's diagonal blocks.
+        topology: of the layout.
+        by_synthesis: whether a step by synthesis has placed the markers; else profiles have.
+    """
+    found = native.measure_scatter(xy, maps, diagonal, topology, by_synthesis, LIMITS)
+    return MarkerScatter(*found)
