@@ -11,12 +11,10 @@ table.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":  # before numpy: times are of one core
@@ -26,7 +24,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.suites.scoring.calibration import calibration_head, squared_distances, summarise
@@ -36,6 +33,7 @@ from benchmarks.suites.scoring.squares import (
     calibrations_by_position,
     picture_squares,
 )
+from benchmarks.support.command import publishing_parser, wide_console
 from benchmarks.support.machine import conditions_text, write_json
 from benchmarks.support.published import write_published
 from benchmarks.support.scenes import (
@@ -189,19 +187,10 @@ def documentation_blocks(results: Sequence[AccuracyResult]) -> dict[str, str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print a table a group; write the JSON file or the documentation if asked."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.accuracy", description=(__doc__ or "").split("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="few noises: a look, no figures to quote")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
-    parser.add_argument(
-        "--publish", action="store_true", help="write docs/measured and the pages that show it"
-    )
-    options = parser.parse_args(arguments)
+    options = publishing_parser("accuracy", __doc__, "noises").parse_args(arguments)
     cv2.setNumThreads(1)
     seeds = QUICK_SEEDS if options.quick else SEEDS
-    terminal = Console()
-    console = terminal if terminal.is_terminal else Console(width=130)  # a pipe has no width
+    console = wide_console(130)
     results: list[AccuracyResult] = []
     calibrations: dict[str, Any] = {}
     for group, cases in GROUPS.items():

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.table import Table
 
+from benchmarks.support.command import wide_console
 from benchmarks.support.machine import conditions_text, write_json
 from cmpdesign.contact import Ball, Contact, Cube, Elastomer, Indenter, Motion, Punch, Ring, solve
 from cmpdesign.contact.elastic_layer.green import green_kernels
@@ -153,7 +153,7 @@ def main(arguments: list[str] | None = None) -> int:
     markers = standard_layout("honeycomb", 8).marker_xy_mm * 1.5
     solve(ELASTOMER, Ball(5.0), Motion(0.1), grid=32)  # loads what is loaded on first use
     rows = [measure_contact(case, 1 if options.quick else 3, markers) for case in CASES]
-    console = Console() if Console().is_terminal else Console(width=110)
+    console = wide_console(110)
     console.print(contact_table(rows))
     forms = closed_form_errors()
     for name, percent in forms.items():

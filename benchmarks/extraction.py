@@ -8,7 +8,6 @@ One core, every image new to the extractor (no previous frame is used). Found ma
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -24,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a scr
 import cv2
 import numpy as np
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
+from benchmarks.support.command import publishing_parser, wide_console
 from benchmarks.support.machine import conditions_text, write_json
 from benchmarks.support.published import write_published
 from benchmarks.support.scenes import WRONG_SHARE, shortest_edges
@@ -259,19 +258,10 @@ def markdown(results: dict[str, Any]) -> dict[str, str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run, print the tables, write the JSON file if asked."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.extraction", description=__doc__.split("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="few runs: a look, no figures to quote")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
-    parser.add_argument(
-        "--publish", action="store_true", help="write docs/measured and the pages that show it"
-    )
-    options = parser.parse_args(arguments)
+    options = publishing_parser("extraction", __doc__, "runs").parse_args(arguments)
     cv2.setNumThreads(1)
     results, tables = run_all(options.quick)
-    terminal = Console()
-    console = terminal if terminal.is_terminal else Console(width=100)  # a pipe has no width
+    console = wide_console(100)
     for table in tables:
         console.print(table)
     console.print(conditions_text(), style="dim", soft_wrap=True)

@@ -18,17 +18,14 @@ covariance C: 1 is right. ``--response linear`` measures the same scenes on line
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from dataclasses import asdict, replace
-from pathlib import Path
 
 # before numpy and chess-corners: times are of one core
 os.environ["OMP_NUM_THREADS"] = os.environ["RAYON_NUM_THREADS"] = "1"
 
 import cv2
-from rich.console import Console
 
 from benchmarks.suites.comparison.measure import CASES, MethodResult, measure_case
 from benchmarks.suites.comparison.pooled import measure_pooled, pooled_cases
@@ -38,6 +35,7 @@ from benchmarks.suites.comparison.report import (
     pooled_table,
     scene_table,
 )
+from benchmarks.support.command import publishing_parser, wide_console
 from benchmarks.support.machine import conditions_text, write_json
 from benchmarks.support.published import write_published
 
@@ -47,22 +45,14 @@ POOLED_SEEDS, QUICK_POOLED_SEEDS = 4, 1
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print one table per scene; write the JSON file or the documentation on request."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.comparison", description=(__doc__ or "").split("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="few repetitions: a look, no figures to quote")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
-    parser.add_argument(
-        "--publish", action="store_true", help="write docs/measured and the pages that show it"
-    )
+    parser = publishing_parser("comparison", __doc__, "repetitions")
     parser.add_argument("--response", choices=("srgb", "linear"), default="srgb", help="of all pictures")
     options = parser.parse_args(arguments)
     if options.publish and options.response != "srgb":
         parser.error("--publish writes the figures of sRGB pictures; leave --response out")
     cv2.setNumThreads(1)
     repetitions = QUICK_REPETITIONS if options.quick else REPETITIONS
-    terminal = Console()
-    console = terminal if terminal.is_terminal else Console(width=150)  # a pipe has no width
+    console = wide_console(150)
     results: list[MethodResult] = []
     caption = f"{options.response} pictures, {repetitions} repetitions; the article's time is an upper bound"
     for case in CASES:

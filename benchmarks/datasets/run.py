@@ -12,7 +12,6 @@ Sizes are those of the shards' files. "start" and "a shard without work" are wha
 
 from __future__ import annotations
 
-import argparse
 import resource
 import sys
 import tempfile
@@ -23,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
+from benchmarks.support.command import publishing_parser, wide_console
 from benchmarks.support.machine import conditions_text, machine_conditions, write_json
 from benchmarks.support.published import write_published
 from cmpdesign.data import load
@@ -275,15 +274,7 @@ def markdown(results: Mapping[str, Any]) -> dict[str, str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print the tables, write the JSON file if asked."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.datasets", description=(__doc__ or "").split("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="few frames: a look, no figures to quote")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure, too")
-    parser.add_argument(
-        "--publish", action="store_true", help="write docs/measured and the page that shows it"
-    )
-    options = parser.parse_args(arguments)
+    options = publishing_parser("datasets", __doc__, "frames").parse_args(arguments)
     shards = QUICK_SHARDS if options.quick else SHARDS
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -295,7 +286,7 @@ def main(arguments: list[str] | None = None) -> int:
         "bytes": asdict(sizes),
         "overheads": [asdict(one) for one in measure_overheads()],
     }
-    console = Console()
+    console = wide_console(100)
     console.print(rates_table(rates))
     console.print(other_table(results))
     console.print(conditions_text(), style="dim", soft_wrap=True)

@@ -97,7 +97,7 @@ def open_folder(folder: Path, prepared: Prepared) -> None:
         raise CmpDesignError(f"{folder}: is not empty and holds no plan.json; give a new folder")
     text = json.dumps(prepared.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     files: dict[str, str | bytes] = {
-        **{name: content for name, content in prepared.files.items() if not path_exists(folder / name)},
+        name: content for name, content in prepared.files.items() if not path_exists(folder / name)
     }
     if not path_exists(folder / PLAN) or read_text(folder / PLAN) != text:
         files[PLAN] = text  # renamed last

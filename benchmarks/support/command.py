@@ -1,0 +1,32 @@
+"""What the commands of benchmarks have in common: their options and the width of their tables."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+
+
+def publishing_parser(name: str, document: str | None, quick: str) -> argparse.ArgumentParser:
+    """The options of ``python -m benchmarks.NAME`` of a benchmark whose figures the documentation shows.
+
+    Args:
+        name: of the benchmark.
+        document: its docstring, whose first line is the description.
+        quick: what a quick run has few of.
+    """
+    description = (document or "").split("\n")[0]
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=description)
+    parser.add_argument("--quick", action="store_true", help=f"few {quick}: a look, no figures to quote")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
+    parser.add_argument(
+        "--publish", action="store_true", help="write docs/measured and the pages that show it"
+    )
+    return parser
+
+
+def wide_console(width: int) -> Console:
+    """The terminal, or of this many columns where there is none: a pipe has no width, and tables would be cut."""
+    terminal = Console()
+    return terminal if terminal.is_terminal else Console(width=width)
