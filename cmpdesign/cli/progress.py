@@ -39,7 +39,7 @@ def progress_bar(doing: str, total: int | None, *, done: int = 0, unit: str = ""
 
         def advance(note: str) -> None:
             progress.advance(task)
-            progress.update(task, note=visible(note), rate=_rate(progress, unit))
+            progress.update(task, note=visible(note), rate=_rate(progress, unit, done))
 
         yield advance
 
@@ -51,8 +51,9 @@ class Steps:
         self._progress = progress
 
     def begin(self, doing: str) -> None:
-        """A step begins."""
+        """A step begins; the last state of the step before is still shown, however short this step was."""
         if self._progress is not None:
+            self._progress.refresh()
             for task in self._progress.task_ids:
                 self._progress.remove_task(task)
             self._progress.add_task(visible(doing), total=None, note="", rate="")
@@ -74,9 +75,12 @@ def working(doing: str) -> Iterator[Steps]:
         yield steps
 
 
-def _rate(progress: Progress, unit: str) -> str:
+def _rate(progress: Progress, unit: str, before: int = 0) -> str:
+    """The rate of the last task, of which an earlier run did ``before`` parts; Rich has none for the first part."""
     task = progress.tasks[-1]
     speed = task.finished_speed or task.speed
+    if speed is None and task.elapsed:
+        speed = (task.completed - before) / task.elapsed
     return "" if speed is None else f"{speed:.3g} {unit}/s"
 
 
