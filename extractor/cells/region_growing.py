@@ -18,6 +18,7 @@ class GrowLimits(NamedTuple):
 
     Attributes:
         threshold: of eq. 3 over OpenCV's 8-bit HSV, below which a pixel belongs to the region; as in the article.
+            Published: the article, below eq. 3.
     """
 
     threshold: float = 0.15

@@ -25,8 +25,8 @@ class QualityLimits(NamedTuple):
     """Limits of the quality.
 
     Attributes:
-        clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255.
-        dim_quantile: of the cells' light, that is the dimmest; the brightest are as many.
+        clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255. Chosen.
+        dim_quantile: of the cells' light, that is the dimmest; the brightest are as many. Chosen.
     """
 
     clipped_value: float = 253.0

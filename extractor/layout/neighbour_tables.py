@@ -22,9 +22,12 @@ class NeighbourMapLimits(NamedTuple):
 
     Attributes:
         min_pivot: of a Cholesky factor of the normal equations; below it the neighbours do not determine the map.
-        min_linear_neighbours: markers; fewer give no map.
-        min_quadratic_neighbours: markers; fewer give the linear map.
-        min_cubic_neighbours: markers; with fewer a cubic map has too few degrees of freedom.
+            Chosen.
+        min_linear_neighbours: markers; fewer give no map. Derived: three coefficients, and one equation over.
+        min_quadratic_neighbours: markers; fewer give the linear map. Derived: six coefficients, and three equations
+            over.
+        min_cubic_neighbours: markers; with fewer a cubic map has too few degrees of freedom. Derived: ten coefficients,
+            and six equations over.
     """
 
     min_pivot: float = 1e-7

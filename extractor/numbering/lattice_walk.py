@@ -42,7 +42,8 @@ class WalkLimits(NamedTuple):
     """Limits of a walk.
 
     Attributes:
-        max_rounds: walks of one component, each without the cells contradicted before; then it is given up.
+        max_rounds: walks of one component, each without the cells contradicted before; then it is given up. Measured:
+            rule "contradictions".
     """
 
     max_rounds: int = 8

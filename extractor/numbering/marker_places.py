@@ -27,16 +27,21 @@ class CornerLimits(NamedTuple):
     image's border cuts it off.
 
     Attributes:
-        max_corner_misfit: in edges, between a triangle's corner and its prediction by the cell's neighbours.
-        max_corner_spread: in edges, between a corner and the mean of its marker's corners.
-        max_agreed_spread: in the triangle's shortest edge, the same for corners that agree.
-        min_sharp_share: share of cells with triangles, above which most have one.
-        border_px: px, from the image's border; the border cuts off cells with a corner nearer to it.
-        predicted_weight: of a predicted corner, relative to a corner of a fitted triangle.
-        max_ambiguity_ratio: of the least misfit to the next rotation's; below it the orientation is clear.
-        max_predicted_deviation: in edges, of a marker whose prediction confirms a triangle's corner.
-        max_predicted_distance: in edges, between that prediction and the corner.
-        max_distance_ratio: of that distance to the one between the prediction and the averaged place.
+        max_corner_misfit: in edges, between a triangle's corner and its prediction by the cell's neighbours. Measured:
+            rule "corner misfit".
+        max_corner_spread: in edges, between a corner and the mean of its marker's corners. Measured: rule "corner
+            spread".
+        max_agreed_spread: in the triangle's shortest edge, the same for corners that agree. Chosen.
+        min_sharp_share: share of cells with triangles, above which most have one. Measured: rule "damaged cells".
+        border_px: px, from the image's border; the border cuts off cells with a corner nearer to it. Measured: rule
+            "cut cells".
+        predicted_weight: of a predicted corner, relative to a corner of a fitted triangle. Chosen.
+        max_ambiguity_ratio: of the least misfit to the next rotation's; below it the orientation is clear. Chosen.
+        max_predicted_deviation: in edges, of a marker whose prediction confirms a triangle's corner. Measured: rule
+            "unmatched rim".
+        max_predicted_distance: in edges, between that prediction and the corner. Measured: rule "unmatched rim".
+        max_distance_ratio: of that distance to the one between the prediction and the averaged place. Measured: rule
+            "unmatched rim".
         prediction: of the maps that predict a marker.
     """
 

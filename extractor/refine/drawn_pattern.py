@@ -32,7 +32,7 @@ class DrawingLimits(NamedTuple):
     """Limits of the drawing.
 
     Attributes:
-        blur_step: of the blur, for derivatives of the levels.
+        blur_step: of the blur, for derivatives of the levels. Chosen.
         gridlines: of the gridlines.
         levels: of the inks.
         bleed: of the neighbours' levels.

@@ -30,8 +30,8 @@ class FirstLookLimits(NamedTuple):
     """Limits of the first look.
 
     Attributes:
-        fallback_sigma_px: the blur where no gridline shows it.
-        blur_gridlines: gridlines for the first estimate of the blur.
+        fallback_sigma_px: the blur where no gridline shows it. Chosen.
+        blur_gridlines: gridlines for the first estimate of the blur. Chosen.
         noise: of the estimate of the noise.
         levels: of the inks.
         profiles: of the profiles across gridlines.

@@ -36,6 +36,7 @@ class ProfileLimits(NamedTuple):
 
     Attributes:
         misfit_tolerance: of the contrast; what glare and uneven light make in a profile does not lower its weight.
+            Chosen.
         rule: by which gridlines are weighed.
         step: of the step.
         rows: of the rows of pixels.

@@ -46,7 +46,7 @@ class StepLimits(NamedTuple):
     """Limits of a step.
 
     Attributes:
-        prior_px: deviation of a marker before it is measured.
+        prior_px: deviation of a marker before it is measured. Chosen.
         weights: of the gridlines.
         bending: of the gridlines.
         information: about the markers.

@@ -69,7 +69,7 @@ class FullScaleLimits(NamedTuple):
     """Limits of the markers at the full scale.
 
     Attributes:
-        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree.
+        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree. Chosen.
     """
 
     agreed_deviation: float = AGREED_DEVIATION

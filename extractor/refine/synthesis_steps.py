@@ -48,8 +48,8 @@ class SynthesisLimits(NamedTuple):
         step: of the step.
         dot_gain: of the dot gain.
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
-            follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge
-            by 0.15 in the second step.
+            follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
+            0.15 in the second step. Measured: rule "settled appearance".
     """
 
     rule: MisfitRule = PIXEL_MISFIT_RULE

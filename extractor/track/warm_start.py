@@ -31,9 +31,10 @@ class WarmStartLimits(NamedTuple):
     """Limits of the proof.
 
     Attributes:
-        center_radius_px: of the disc over which a middle's color is averaged.
+        center_radius_px: of the disc over which a middle's color is averaged. Chosen.
         min_center_strength: of a middle's ink level, relative to the frame before, for the middle to show its ink.
-        min_verified_share: of the cells in view that the image must confirm.
+            Chosen.
+        min_verified_share: of the cells in view that the image must confirm. Chosen.
     """
 
     center_radius_px: float = 0.5
