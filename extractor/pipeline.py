@@ -47,10 +47,10 @@ from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
 from extractor.result import Markers, Origin, Reason
 
-WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
+WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MAX_DOMAINS_PER_CELL = 3  # number of domains per cell of the pattern above which an image is cluttered,
-MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains
-MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
+MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains; both chosen
+MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern; chosen
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]

@@ -13,8 +13,8 @@ from extractor._native import cells as native
 from extractor.image.ink_segmentation import Segmentation
 
 NO_DOMAIN_LIMIT = 1 << 62
-SAFE_AREA_PX = 20  # px^2, a cell with edges of 7 px
-MAX_SMALL_SHARE = 1 / 6  # of domains below SAFE_AREA_PX
+SAFE_AREA_PX = 20  # px^2, a cell with edges of 7 px; derived: 0.43 times 7 squared
+MAX_SMALL_SHARE = 1 / 6  # of domains below SAFE_AREA_PX; chosen
 
 
 class DomainLimits(NamedTuple):

@@ -16,9 +16,11 @@ from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.quality import UNKNOWN, Quality
 from extractor.refine.measure.gridline_weights import median_edge
 
-CELLS_PER_INK = 40  # that are sampled
-SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged
-CLIPPING_STRIDE = 4  # of the pixels by which the clipping of an image without numbers is measured
+CELLS_PER_INK = 40  # that are sampled; chosen
+SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged; chosen
+CLIPPING_STRIDE = (
+    4  # of the pixels by which the clipping of an image without numbers is measured; chosen, for time
+)
 
 
 class QualityLimits(NamedTuple):

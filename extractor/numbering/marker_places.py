@@ -16,8 +16,10 @@ from extractor.layout.neighbour_tables import NeighbourMapLimits
 from extractor.localmap.affine_maps import completed_linear_maps
 from extractor.numbering.lattice_walk import Numbering
 
-AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend
-MAX_PLACE_ERROR = 0.1  # in edges, between a marker's place by its gridlines and a correct initial place
+AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend; chosen
+MAX_PLACE_ERROR = (
+    0.1  # in edges, between a marker's place by its gridlines and a correct initial place; chosen
+)
 
 
 class CornerLimits(NamedTuple):

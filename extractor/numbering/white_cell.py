@@ -23,7 +23,7 @@ SIDE_POINTS = [
 OUTSIDE_POINTS = np.concatenate(
     [1.7 * CORNERS, np.array(SIDE_POINTS) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]]
 )
-GRID, GRID_REACH = 4, 0.8  # half width in points and in axial steps of the grid for the centroid
+GRID, GRID_REACH = 4, 0.8  # half width in points and in axial steps of the grid for the centroid; chosen
 GRID_STEPS = np.arange(-GRID, GRID + 1)
 CENTROID_POINTS = (
     GRID_REACH / GRID * np.array([[a, b] for a in GRID_STEPS for b in GRID_STEPS if abs(a + b) <= GRID])

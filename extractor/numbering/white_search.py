@@ -22,7 +22,8 @@ from extractor.numbering.white_cell import WhiteCellLayout, WhiteCellLimits
 from extractor.numbering.whiteness import LIMITS as WHITENESS_LIMITS
 from extractor.numbering.whiteness import WhitenessLimits, measure_inks
 
-MIN_RELATIVE_BRIGHTNESS = 0.6  # of the brightest; a compressed black cell filled by blur stays below
+# of the brightest; a compressed black cell filled by blur stays below. Measured: rule "relative brightness"
+MIN_RELATIVE_BRIGHTNESS = 0.6
 
 
 class WhiteSearchLimits(NamedTuple):

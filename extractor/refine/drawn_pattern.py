@@ -25,7 +25,7 @@ from extractor.refine.synthesis.ink_levels import InkLevelLimits, InkLevels
 from extractor.refine.synthesis.pixel_rows import LIMITS as ROW_LIMITS
 from extractor.refine.synthesis.pixel_rows import PixelRowLimits
 
-MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn
+MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn; derived: 6e-5 of a blurred edge lies beyond
 
 
 class DrawingLimits(NamedTuple):

@@ -28,7 +28,7 @@ from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 
 SAMPLE_MISFIT_RULE = MisfitRule(1, 4, 1.0)
-MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile
+MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile; chosen
 
 
 class ProfileLimits(NamedTuple):

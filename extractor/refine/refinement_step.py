@@ -22,7 +22,7 @@ from extractor.refine.solve.fisher_information import Information, InformationLi
 from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
 from extractor.refine.synthesis.gridlines import gridlines
 
-PRIOR_PX = 10.0  # deviation of a marker before it is measured
+PRIOR_PX = 10.0  # deviation of a marker before it is measured; chosen, far above any error
 
 
 class MisfitRule(NamedTuple):

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from extractor._native import track as native
 from extractor.track.warm_tables import WarmTables
 
-LARGE_SHIFT = 0.2  # in edges; after a larger shift the window is moved and the shift measured again
-RESTING_SHIFT = 0.02  # of a cell from the frame before, in edges, up to which the cell rests
+LARGE_SHIFT = 0.2  # in edges; after a larger shift the window is moved and the shift measured again. Chosen
+RESTING_SHIFT = 0.02  # of a cell from the frame before, in edges, up to which the cell rests; chosen
 
 
 class AlignmentLimits(NamedTuple):

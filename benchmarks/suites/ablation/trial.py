@@ -5,7 +5,8 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.worker import Reading
 from benchmarks.suites.scoring.calibration import squared_distances
-from benchmarks.support.code_copy import CodeCopy, environment
+from benchmarks.support.code_copy import CodeCopy, Replacement, environment
 from extractor import Status
 
 WRONG_POSITION, SAME_PLACE = (
@@ -63,14 +64,32 @@ def read_without(
         ValueError: a rule's text does not occur exactly once.
         RuntimeError: the reader cannot be built or run.
     """
-    names = ", ".join(rule.name for rule in rules) or "any change"
+    try:
+        readings = read_changed([rule.change for rule in rules], [one.path for one in pictures], preset, copy)
+    except RuntimeError as error:
+        names = ", ".join(rule.name for rule in rules) or "any change"
+        raise RuntimeError(f"without {names}: {error}") from error
+    return [
+        score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
+    ]
+
+
+def read_changed(
+    changes: Iterable[Replacement], pictures: Sequence[Path], preset: str, copy: CodeCopy
+) -> list[Reading]:
+    """What the copy of the reader finds in the pictures when its texts are changed.
+
+    Raises:
+        ValueError: a text to be replaced does not occur exactly once.
+        RuntimeError: the reader cannot be built or run.
+    """
     out = copy.folder / "readings"
-    with copy.replaced([rule.change for rule in rules]):
+    with copy.replaced(changes):
         result = subprocess.run(
             [
                 *(sys.executable, "-m", "benchmarks.suites.ablation.worker"),
                 *(str(copy.folder), preset, str(out)),
-                *(str(picture.path) for picture in pictures),
+                *map(str, pictures),
             ],
             cwd=copy.folder,
             env=environment(copy.folder),
@@ -79,11 +98,8 @@ def read_without(
             check=False,
         )
     if result.returncode != 0:
-        raise RuntimeError(f"without {names}: {result.stderr[-2000:]}")
-    readings = [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
-    return [
-        score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
-    ]
+        raise RuntimeError(result.stderr[-2000:])
+    return [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
 
 
 def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureScore:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from extractor._native import measure as native
 
-SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge
+SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge; chosen
 MIN_NOISE = 0.3  # gray levels; rounding alone makes 0.29
 MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
 

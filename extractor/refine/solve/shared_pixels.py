@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-MIN_ANGLE = 0.4  # rad; the closed forms hold for long gridlines, which two at a smaller angle are not
+MIN_ANGLE = 0.4  # rad; the closed forms hold for long gridlines, which two at a smaller angle are not. Chosen
 DEGREE = 8  # of the polynomials; the native code has room for as many coefficients
 
 
