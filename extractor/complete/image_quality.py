@@ -18,9 +18,8 @@ from extractor.refine.measure.gridline_weights import median_edge
 
 CELLS_PER_INK = 40  # that are sampled; chosen
 SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged; chosen
-CLIPPING_STRIDE = (
-    4  # of the pixels by which the clipping of an image without numbers is measured; chosen, for time
-)
+# of the pixels by which the clipping of an image without numbers is measured; chosen, for time
+CLIPPING_STRIDE = 4
 
 
 class QualityLimits(NamedTuple):

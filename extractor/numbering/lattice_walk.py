@@ -26,9 +26,8 @@ from extractor.result import Origin, Reason
 
 # cells, of the best reference over the next one in its component of the mesh; measured: rule "rivals"
 MIN_SCORE_LEAD = 2
-MAX_MORE_MISSING = (
-    2  # neighbours that a second pad misses more than the best; an outline in view is many. Chosen
-)
+# neighbours that a second pad misses more than the best; an outline in view is many. Chosen
+MAX_MORE_MISSING = 2
 # of the whitest candidate; less white ones are no white cells. Measured: rule "relative whiteness"
 MIN_RELATIVE_WHITENESS = 0.75
 # A component of the mesh is this pattern if it shows this share of the pattern's cells and hardly any cell is outside.

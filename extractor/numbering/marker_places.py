@@ -17,9 +17,8 @@ from extractor.localmap.affine_maps import completed_linear_maps
 from extractor.numbering.lattice_walk import Numbering
 
 AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend; chosen
-MAX_PLACE_ERROR = (
-    0.1  # in edges, between a marker's place by its gridlines and a correct initial place; chosen
-)
+# in edges, between a marker's place by its gridlines and a correct initial place; chosen
+MAX_PLACE_ERROR = 0.1
 
 
 class CornerLimits(NamedTuple):

@@ -23,9 +23,8 @@ from extractor.refine.synthesis.ink_levels import LIMITS as LEVEL_LIMITS
 from extractor.refine.synthesis.ink_levels import InkLevelLimits, InkLevels
 
 DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured; chosen
-MIN_CORRECTED_BLEED = (
-    0.002  # of a neighbour's level in the middle of a cell, above which bleed is removed; chosen
-)
+# of a neighbour's level in the middle of a cell, above which bleed is removed; chosen
+MIN_CORRECTED_BLEED = 0.002
 
 
 class FirstLookLimits(NamedTuple):

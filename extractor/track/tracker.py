@@ -28,9 +28,8 @@ from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_m
 
 MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a cold start may find more. Chosen
 WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice; chosen
-EDGE_SAMPLING_STEP = (
-    8  # one of this number of edges is measured for the choice of that scale; chosen, for time
-)
+# one of this number of edges is measured for the choice of that scale; chosen, for time
+EDGE_SAMPLING_STEP = 8
 COLD_START_INTERVAL = 200  # frames after which a cold start is done; chosen
 # Warm passes over the image of a cold start. Warm frames start from levels and blur of the frame before: without these
 # passes, equal frames after a cold start differ from it by 0.18 stated standard deviations (median), with two by 0.04.

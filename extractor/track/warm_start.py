@@ -23,12 +23,10 @@ from extractor.track.image_check import CONFIRMED, check_cells
 from extractor.track.ink_alignment import align_to_inks
 from extractor.track.warm_tables import WarmTables
 
-MIN_PREDICTED = (
-    0.8  # of the cells in view whose middles must show their ink under a predicted position; chosen
-)
-MIN_WHITE_EDGES = (
-    2  # of a cell's three edges across which it is bright, for the white cell and for a rival; chosen
-)
+# of the cells in view whose middles must show their ink under a predicted position; chosen
+MIN_PREDICTED = 0.8
+# of a cell's three edges across which it is bright, for the white cell and for a rival; chosen
+MIN_WHITE_EDGES = 2
 
 
 class WarmStartLimits(NamedTuple):
