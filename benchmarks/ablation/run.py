@@ -1,6 +1,6 @@
 """What each rule of the reader is worth: every rule switched off in a copy of the reader, over the same pictures.
 
-    python -m benchmarks.ablation [--rule NAME ...] [--preset NAME] [--pictures N] [--seed S] [--json FILE]
+    python -m benchmarks.ablation [--rule NAME ...] [--together] [--preset NAME] [--pictures N] [--seed S]
 
 A rule for accuracy is tried on the suites plain, stress, damage, scatter and camera together; a rule whose purpose is
 that no wrong id is reported, on pictures made to provoke wrong ids. A rule stays if it saves a wrong id, or if without
@@ -10,8 +10,9 @@ zero (bootstrap over pictures). Without a seed, that of the commit's hash is tak
 Wrong ids are at another marker's place, or in a picture without the pattern; wrong positions are more than half of the
 shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both
 are judged. Differences are "without the rule" minus "with it". z is of all reported markers, time the ratio of
-processor times. Rules in C++ need a compiler: every process builds a copy of the reader once, and for each such rule
-compiles the changed file.
+processor times. Two rules may replace each other: with ``--together`` all named rules are switched off at once, in
+the pictures of both kinds. Rules in C++ need a compiler: every process builds a copy of the reader once, and for each
+such rule compiles the changed file.
 """
 
 from __future__ import annotations
@@ -88,6 +89,20 @@ def try_rules(
         yield from pool.map(try_rule, rules)
 
 
+def try_together(rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str) -> Iterable[Comparison]:
+    """For the suites of each kind, the comparison of the reader without all of the rules, named after the first."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = CodeCopy(Path(folder) / "copy")
+        if any(rule.change.is_native for rule in rules):
+            copy.build()
+        for kind, suites in SUITES.items():
+            own = [picture for picture in pictures if picture.suite in suites]
+            full, without = (read_without(some, own, preset, copy) for some in ((), rules))
+            yield compare(
+                rules[0]._replace(name=f"{rules[0].name} + {len(rules) - 1}", kind=kind), full, without
+            )
+
+
 def comparison_line(found: Comparison) -> str:
     """The line of a rule below ``HEAD``."""
     return (
@@ -124,6 +139,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--rule", action="append", choices=tuple(BY_NAME), metavar="NAME", help="all by default"
     )
+    parser.add_argument("--together", action="store_true", help="switch the rules off all at once")
     parser.add_argument("--preset", choices=tuple(PRESETS), default="balanced")
     parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of each suite")
     parser.add_argument("--seed", type=int, metavar="S", help="of all random choices")
@@ -144,7 +160,8 @@ def main(arguments: list[str] | None = None) -> int:
     if seed < 0:
         parser.error(f"--seed is {seed}; it must be 0 or more")
     started, found = time.perf_counter(), []
-    suites = list(dict.fromkeys(suite for rule in rules for suite in SUITES[rule.kind]))
+    kinds = list(SUITES) if options.together else [rule.kind for rule in rules]
+    suites = list(dict.fromkeys(suite for kind in kinds for suite in SUITES[kind]))
     with tempfile.TemporaryDirectory() as folder:
         pictures = [
             picture
@@ -152,7 +169,12 @@ def main(arguments: list[str] | None = None) -> int:
             for picture in keep_pictures(suite, options.pictures, seed, Path(folder))
         ]
         print(HEAD, flush=True)
-        for comparison in try_rules(rules, pictures, options.preset, options.processes):
+        comparisons: Iterable[Comparison] = (
+            try_together(rules, pictures, options.preset)
+            if options.together
+            else try_rules(rules, pictures, options.preset, options.processes)
+        )
+        for comparison in comparisons:
             found.append(comparison)
             print(comparison_line(comparison), flush=True)
     print(f"{len(pictures)} pictures, seed {seed}, {options.preset}; {time.perf_counter() - started:.0f} s")
