@@ -59,7 +59,7 @@ REFINEMENT = (
     Rule(
         "last step",
         "the last of a preset's steps by synthesis, where markers still move",
-        "accuracy",
+        "errors and time",
         "extractor/refine/refiner.py",
         "self._synthesis_solver.steps(view, start, schedule, usual_px)",
         "self._synthesis_solver.steps(view, start, schedule._replace(steps=schedule.steps - 1), usual_px)",
@@ -67,7 +67,7 @@ REFINEMENT = (
     Rule(
         "small move",
         "no step follows one that hardly moved the markers",
-        "accuracy",
+        "errors and time",
         "extractor/refine/synthesis_steps.py",
         "typical_move(shift, estimate.information) < schedule.small_move",
         "typical_move(shift, estimate.information) < 0.0",
@@ -75,7 +75,7 @@ REFINEMENT = (
     Rule(
         "settled appearance",
         "a step follows while blur or dot gain still change",
-        "accuracy",
+        "errors and time",
         "extractor/refine/synthesis_steps.py",
         "if judged and is_settled and",
         "if judged and",
@@ -83,7 +83,7 @@ REFINEMENT = (
     Rule(
         "scatter",
         "where markers lie by themselves off the smooth map, gridlines do not curve as its tangents say",
-        "accuracy",
+        "errors and time",
         "extractor/refine/measure/marker_scatter.py",
         "return MarkerScatter(*found)",
         "return NO_SCATTER",
@@ -91,7 +91,7 @@ REFINEMENT = (
     Rule(
         "scatter of profiles",
         "what profiles leave is not taken for scatter",
-        "accuracy",
+        "errors and time",
         "extractor/refine/measure/marker_scatter.py",
         "start_allowance: float = 100.0",
         "start_allowance: float = 2.0",

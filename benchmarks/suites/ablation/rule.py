@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from benchmarks.support.code_copy import Replacement
 
-Kind = Literal["accuracy", "no wrong id"]
+Kind = Literal["accuracy", "errors and time", "no wrong id"]
 
 
 class Rule(NamedTuple):
@@ -21,7 +21,8 @@ class Rule(NamedTuple):
     Attributes:
         name: of the rule.
         purpose: what the rule is for.
-        kind: by what it is judged: by counts and errors in the five suites, or by the wrong ids that it prevents.
+        kind: by what it is judged: by counts and errors in the five suites, by z and processor time, too, or by the
+            wrong ids that it prevents.
         file: of the reader's source, relative to the checkout.
         text: of the file, to be replaced.
         without: the text that replaces it and switches the rule off.

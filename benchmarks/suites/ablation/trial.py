@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.worker import Reading
-from benchmarks.suites.scoring.calibration import squared_distances
+from benchmarks.suites.scoring.calibration import BEYOND_D2, squared_distances
 from benchmarks.support.code_copy import CodeCopy, Replacement, environment
 from extractor import Status
 
@@ -36,6 +36,7 @@ class PictureScore(NamedTuple):
         squared_px2: the sum of their squared errors, both axes.
         reported: reported, not wrong.
         d2: the sum of their squared errors over stated covariances.
+        beyond: reported, not wrong, with such a square above ``BEYOND_D2``.
         ms: processor time; NaN after an exception.
     """
 
@@ -47,6 +48,7 @@ class PictureScore(NamedTuple):
     squared_px2: float
     reported: int
     d2: float
+    beyond: int
     ms: float
 
     @property
@@ -106,7 +108,7 @@ def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureSc
     """The score of a reading against the pattern in the picture that it is nearest to."""
     reported = reading.status != Status.LOST
     if not truths:
-        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, 0, 0.0, reading.ms)
+        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, 0, 0.0, 0, reading.ms)
     scores = [_score_pattern(reading, truth) for truth in truths]
     return min(scores, key=lambda score: (score.wrong, score.lost))
 
@@ -132,5 +134,6 @@ def _score_pattern(reading: Reading, truth: PatternTruth) -> PictureScore:
         squared_px2=float((error_px[measured] ** 2).sum()),
         reported=int(right.sum()),
         d2=float(d2[np.isfinite(d2)].sum()),
+        beyond=int((d2 > BEYOND_D2).sum()),
         ms=reading.ms,
     )
