@@ -71,12 +71,10 @@ class Threshold(NamedTuple):
 
 THRESHOLDS = {
     "max_distance": Threshold(
-        "extractor/complete/consistency_filter.py", "max_distance", (0.06, 0.08, 0.1, 0.12, 0.2, 0.3)
+        "extractor/complete/consistency_filter.py", "max_distance", (0.04, 0.06, 0.1, 0.25, 0.4, 1.0)
     ),
-    "max_deviation": Threshold(
-        "extractor/refine/acceptance.py", "max_deviation", (0.01, 0.015, 0.02, 0.05, 0.1)
-    ),
-    "max_shift": Threshold("extractor/refine/acceptance.py", "max_shift", (0.1, 0.15, 0.2, 0.35, 0.5)),
+    "max_deviation": Threshold("extractor/refine/acceptance.py", "max_deviation", (0.01, 0.02, 0.06, 0.15)),
+    "max_shift": Threshold("extractor/refine/acceptance.py", "max_shift", (0.1, 0.18, 0.4, 0.8)),
 }
 
 

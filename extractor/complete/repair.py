@@ -38,9 +38,7 @@ class RepairLimits(NamedTuple):
     missing cells and dirt on flat, tilted, pressed and twisted patterns: deviation = ``mild_error`` * leverage *
     residual, as the surface departs the more from the map the farther this extrapolates. A layer's quadratic rests on
     few markers and may seem to fit better than it does: its variance counts ``heavy_error`` times, and is never below
-    that of the model. Likewise against the residual of a cubic in nearly whole rings, on the surfaces under balls,
-    rings, ribs, wedges and cubes (their true markers, with up to three neighbours removed): 99 % of the errors stay
-    below 1.5 deviations of ``cubic_error`` * residual.
+    that of the model.
 
     Attributes:
         max_implied_distance: between the place that cells imply and the prediction by markers. Measured: rule "repair
@@ -63,7 +61,6 @@ class RepairLimits(NamedTuple):
         mild_error: times leverage and residual. Measured as described above, by no command that is kept;
             `python -m benchmarks.calibration` prints z of repaired markers.
         heavy_error: the same of a layer's quadratic, as a factor of the variance. Measured likewise.
-        cubic_error: times the residual of a cubic. Measured likewise.
         layers: limits of a layer's quadratic.
         maps: limits of the predictions by neighbours.
     """
@@ -83,7 +80,6 @@ class RepairLimits(NamedTuple):
     fitted_model_sigmas: float = 3.0
     mild_error: float = 1.6
     heavy_error: float = 2.0
-    cubic_error: float = 1.6
     layers: LayerLimits = LAYER_LIMITS
     maps: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS
 

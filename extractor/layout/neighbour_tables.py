@@ -26,14 +26,11 @@ class NeighbourMapLimits(NamedTuple):
         min_linear_neighbours: markers; fewer give no map. Derived: three coefficients, and one equation over.
         min_quadratic_neighbours: markers; fewer give the linear map. Derived: six coefficients, and three equations
             over.
-        min_cubic_neighbours: markers; with fewer a cubic map has too few degrees of freedom. Derived: ten coefficients,
-            and six equations over.
     """
 
     min_pivot: float = 1e-7
     min_linear_neighbours: int = 4
     min_quadratic_neighbours: int = 9
-    min_cubic_neighbours: int = 16
 
 
 LIMITS = NeighbourMapLimits()

@@ -164,14 +164,6 @@ COMPLETE = (
         "max_implied_distance: float = 0.0",
     ),
     Rule(
-        "repair by cubic",
-        "a lost marker in nearly whole rings is repaired on a bent surface",
-        "accuracy",
-        "extractor/complete/repair.py",
-        "cubic_error: float = 1.6",
-        "cubic_error: float = np.inf",
-    ),
-    Rule(
         "repair by layer",
         "a lost marker is fitted on the quadratic of its layer and sextant",
         "accuracy",

@@ -72,12 +72,6 @@ double variance_by_neighbours(Index m, const RingPrediction& rings, double edge_
   return square(limits.mild_error * leverage) * variance + outer_error;
 }
 
-// The same where the surface is bent, but the rings are nearly whole, from the residual of a cubic, px^2.
-double variance_by_cubic(double residual, double edge_px, const RepairLimits& limits) {
-  const double variance = square(limits.cubic_error) * residual + square(limits.model_deviation * edge_px);
-  return variance < square(limits.max_repaired_deviation * edge_px) ? variance : NOT_A_NUMBER;
-}
-
 // The same by the quadratic through the marker's layer, from the variance of its residual, px^2.
 double variance_by_layer(double residual, double edge_px, const RepairLimits& limits) {
   if (!(residual + square(limits.fitted_model_sigmas * limits.model_deviation * edge_px) <
@@ -147,7 +141,7 @@ class Repair {
       const auto implied = markers_.implied_px[m];
       lost_[m] = !fill(m, implied, variance_by_cells(m, rings, implied, edge_px_[m], size_, limits_));
     });
-    if (is_any(lost_)) fill_remaining(rings);
+    if (is_any(lost_)) fill_by_layer();
     drop_outside();
     return std::move(status_);
   }
@@ -191,17 +185,11 @@ class Repair {
     }
   }
 
-  // the weaker and slower predictions, only for the remaining markers
-  void fill_remaining(const RingPrediction& rings) {
-    Flags dense({count_});
-    for (Index m = 0; m < count_; ++m)
-      dense[m] = lost_[m] && rings.both.neighbour_count[m] >= limits_.maps.min_cubic_neighbours;
-    const auto by_cubic =
-        localmap::cubic_variance(known_, dense, tables_.marker_mm, tables_.neighbours, limits_.maps);
+  // the weakest and slowest prediction, only for the remaining markers
+  void fill_by_layer() {
     const auto [layer_xy, layer_variance] = predict_by_layer(known_, tables_.layers, limits_.layers);
     for (Index m = 0; m < count_; ++m) {
-      if (!lost_[m] || fill(m, rings.both.xy_px[m], variance_by_cubic(by_cubic[m], edge_px_[m], limits_)))
-        continue;
+      if (!lost_[m]) continue;
       status_[m] = FITTED;
       fill(m, layer_xy[m], variance_by_layer(layer_variance[m], edge_px_[m], limits_));
     }
