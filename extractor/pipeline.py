@@ -201,7 +201,7 @@ class Extractor:
             quality = stages.record("quality", measure_quality_without_numbers(pyramid.level(1), found.cells))
             return ReadImage(no_markers(self.layout, found.reason, stages, quality), None)
         cells, numbering = found.cells, found.numbering
-        places = stages.record("place", merge_corners(cells, numbering, self._lattice, pyramid.size))
+        places = stages.record("place", merge_corners(cells, numbering, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
     def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:

@@ -136,7 +136,6 @@ def verify_prediction(
     places = InitialMarkers(
         level.to_full_scale(verified.xy_px),
         aligned.edge_px * level.scale,
-        tables.corners[proved],
         *agreement,
     )
     return WarmStart(places, np.where(proved[:, None], check.cell_levels, levels_before), by_rim)

@@ -30,22 +30,6 @@ PLACES = (
         "max_corner_spread: float = np.inf",
     ),
     Rule(
-        "damaged cells",
-        "where most cells have triangles, the edges of one without are not drawn",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "min_sharp_share: float = 0.6",
-        "min_sharp_share: float = 1.0",
-    ),
-    Rule(
-        "cut cells",
-        "cells that the image's border cuts off are drawn without a triangle",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "border_px: float = 3.0",
-        "border_px: float = -np.inf",
-    ),
-    Rule(
         "unmatched rim",
         "a rejected triangle at the rim gives a corner that the neighbouring markers predict",
         "accuracy",

@@ -76,13 +76,6 @@ Triangle predicted_triangle(const MappedCells& cells, Index i, View<const double
   return out;
 }
 
-// The least distance of a corner from the border of an image with this last column and row, px.
-double border_distance(const Triangle& corner, double last_x, double last_y) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const PlanePoint& at : corner) nearest = std::min({nearest, at.x, at.y, last_x - at.x, last_y - at.y});
-  return nearest;
-}
-
 // (M, 4) the weighted sums of x, y and edge, and of the weights, at each marker.
 Array<double, 2> corner_sums(const CellCorners& corners, Index count, double predicted_weight) {
   Array<double, 2> out({count, 4}, 0.0);
@@ -126,40 +119,20 @@ Array<std::int64_t, 1> update_disagreeing_and_count(const CellCorners& corners, 
   return agreeing;
 }
 
-// (K, 3) the marker ids of the cells whose corners are all known; if most are sharp, of those kept.
-Array<std::int32_t, 2> known_cells(const CellCorners& corners, View<const double, 2> xy) {
-  const auto ids = corners.ids;
-  Array<std::int32_t, 2> cells({ids.size(), 3});
-  Index rows = 0;
-  for (Index n = 0; n < ids.size(); ++n) {
-    const std::int32_t a = ids(n, 0), b = ids(n, 1), c = ids(n, 2);
-    const bool is_known = std::isfinite(xy(a, 0)) && std::isfinite(xy(b, 0)) && std::isfinite(xy(c, 0));
-    if (is_known && (corners.is_kept[n] || !corners.is_sharp)) {
-      cells(rows, 0) = a;
-      cells(rows, 1) = b;
-      cells(rows, 2) = c;
-      ++rows;
-    }
-  }
-  return cells.first(rows);
-}
-
 }  // namespace
 
 CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> vectors_mm,
-                              View<const std::int32_t, 2> corner_ids, std::array<Index, 2> size,
-                              const CornerLimits& limits) {
+                              View<const std::int32_t, 2> corner_ids, const CornerLimits& limits) {
   Array<Index, 1> here({cells.slope.size()});
-  Index count = 0, matched = 0;
+  Index count = 0;
   for (Index i = 0; i < cells.slope.size(); ++i)
     if (std::isfinite(cells.slope(i, 0, 0))) here[count++] = i;
-  const auto last_x = static_cast<double>(size[0] - 1), last_y = static_cast<double>(size[1] - 1);
   // clockwise in the image a cell's corners run 0, 2, 1, from the back 0, 1, 2
   const int corner_step = cells.mirrored ? 1 : 2;
   Array<std::int32_t, 2> ids({count, 3});
   Array<double, 3> corner_px({count, 3, 2}), rejected_px({count, 3, 2}, NOWHERE);
   Array<double, 1> edge({count});
-  Array<bool, 1> fitted({count}), kept({count});
+  Array<bool, 1> fitted({count});
   for (Index n = 0; n < count; ++n) {
     const Index i = here[n];
     const Triangle predicted = predicted_triangle(cells, i, vectors_mm);
@@ -176,12 +149,8 @@ CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> ve
     fill_triangle(corner_px, n, fit.is_fitted ? turned : predicted);
     if (!fit.is_fitted && fit.is_clear) fill_triangle(rejected_px, n, turned);
     fitted[n] = fit.is_fitted;
-    matched += fit.is_fitted;
-    kept[n] = fit.is_fitted || !(border_distance(predicted, last_x, last_y) >= limits.border_px);
   }
-  const bool is_sharp = static_cast<double>(matched) > limits.min_sharp_share * static_cast<double>(count);
-  return {std::move(ids),  std::move(corner_px),   std::move(edge), std::move(fitted),
-          std::move(kept), std::move(rejected_px), is_sharp};
+  return {std::move(ids), std::move(corner_px), std::move(edge), std::move(fitted), std::move(rejected_px)};
 }
 
 MergedCornerArrays average_corners(const CellCorners& corners, Index count, const CornerLimits& limits) {
@@ -199,8 +168,7 @@ MergedCornerArrays average_corners(const CellCorners& corners, Index count, cons
     }
   }
   auto agreeing = update_disagreeing_and_count(corners, edge, xy, limits);
-  auto cells = known_cells(corners, xy);
-  return {std::move(xy), std::move(edge), std::move(agreeing), std::move(cells), std::move(unmatched)};
+  return {std::move(xy), std::move(edge), std::move(agreeing), std::move(unmatched)};
 }
 
 void update_unmatched_markers(View<double, 2> xy_px, View<const double, 1> edge_px,
