@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from extractor._native import numbering as native
 from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
-from extractor.layout.neighbour_tables import LIMITS as NEIGHBOUR_MAP_LIMITS
-from extractor.layout.neighbour_tables import NeighbourMapLimits
 from extractor.localmap.affine_maps import completed_linear_maps
 from extractor.numbering.lattice_walk import Numbering
 
@@ -31,24 +29,12 @@ class CornerLimits(NamedTuple):
             spread".
         max_agreed_spread: in the triangle's shortest edge, the same for corners that agree. Chosen.
         predicted_weight: of a predicted corner, relative to a corner of a fitted triangle. Chosen.
-        max_ambiguity_ratio: of the least misfit to the next rotation's; below it the orientation is clear. Chosen.
-        max_predicted_deviation: in edges, of a marker whose prediction confirms a triangle's corner. Measured: rule
-            "unmatched rim".
-        max_predicted_distance: in edges, between that prediction and the corner. Measured: rule "unmatched rim".
-        max_distance_ratio: of that distance to the one between the prediction and the averaged place. Measured: rule
-            "unmatched rim".
-        prediction: of the maps that predict a marker.
     """
 
     max_corner_misfit: float = 0.28
     max_corner_spread: float = 0.3
     max_agreed_spread: float = 0.2
     predicted_weight: float = 0.05
-    max_ambiguity_ratio: float = 0.6
-    max_predicted_deviation: float = 0.15
-    max_predicted_distance: float = 0.1
-    max_distance_ratio: float = 0.5
-    prediction: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS
 
 
 LIMITS = CornerLimits()
@@ -97,14 +83,12 @@ class _CellCorners(NamedTuple):
         corner_px: (C, 3, 2) float64, of the cell's triangle where that is fitted, else predicted.
         edge_px: (C,) float64, the mean predicted edge.
         is_fitted: (C,) bool, the triangle agrees with the prediction.
-        rejected_px: (C, 3, 2) float64, the corners of triangles not fitted whose orientation is clear, else NaN.
     """
 
     ids: NDArray[np.int32]
     corner_px: NDArray[np.float64]
     edge_px: NDArray[np.float64]
     is_fitted: NDArray[np.bool_]
-    rejected_px: NDArray[np.float64]
 
 
 class _MergedCorners(NamedTuple):
@@ -114,22 +98,18 @@ class _MergedCorners(NamedTuple):
         xy_px: (M, 2) float64, weighted means of the corners; NaN where there is none, or they disagree.
         edge_px: (M,) float64, weighted means of the edges, NaN where there is none.
         agreeing: (M,) int64, how many fitted triangles agree.
-        is_unmatched: (M,) bool, markers with predicted corners only.
     """
 
     xy_px: NDArray[np.float64]
     edge_px: NDArray[np.float64]
     agreeing: NDArray[np.int64]
-    is_unmatched: NDArray[np.bool_]
 
 
 def merge_corners(cells: Cells, numbering: Numbering, lattice: Lattice) -> InitialMarkers:
     """Merge the corners at each marker (eqs. 4 and 5: at most one red, green and blue, no farther apart than L).
 
     A cell's corners are those of its triangle where the triangle agrees with the prediction by the cell's neighbours,
-    else the predicted ones. A marker whose triangles disagree is lost. At the pattern's rim all neighbours are on one
-    side and predict a bent cell badly: there one corner of a triangle is accepted if the neighbouring markers predict
-    it.
+    else the predicted ones. A marker whose triangles disagree is lost.
 
     Args:
         cells: the cells of the image.
@@ -148,18 +128,6 @@ def merge_corners(cells: Cells, numbering: Numbering, lattice: Lattice) -> Initi
     )
     merged = _MergedCorners(*native.average_corners(corners, len(lattice.marker_mm), LIMITS))
     agreed, is_intact = corner_agreement(merged.agreeing, lattice.cells_per_marker)
-    unmatched = merged.is_unmatched & lattice.is_rim
-    if unmatched.any():
-        native.update_unmatched_markers(
-            merged.xy_px,
-            merged.edge_px,
-            agreed,
-            unmatched,
-            corners,
-            lattice.marker_mm,
-            lattice.neighbours,
-            LIMITS,
-        )
     return InitialMarkers(merged.xy_px, merged.edge_px, agreed, is_intact)
 
 

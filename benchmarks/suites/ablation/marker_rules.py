@@ -29,14 +29,6 @@ PLACES = (
         "max_corner_spread: float = 0.3",
         "max_corner_spread: float = np.inf",
     ),
-    Rule(
-        "unmatched rim",
-        "a rejected triangle at the rim gives a corner that the neighbouring markers predict",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "unmatched = merged.is_unmatched & lattice.is_rim",
-        "unmatched = merged.is_unmatched & False",
-    ),
 )
 
 REFINEMENT = (

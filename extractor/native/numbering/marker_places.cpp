@@ -43,7 +43,7 @@ int index_of_least(const std::array<double, 3>& values) {
 // How a cell's triangle lies on its predicted corners.
 struct TriangleFit {
   int first;  // the triangle's corner that is corner 0
-  bool is_fitted, is_clear;
+  bool is_fitted;
 };
 
 // Compares a triangle with the predicted corners, in all three rotations.
@@ -57,9 +57,7 @@ TriangleFit fit_triangle(const Triangle& triangle, const Triangle& corner, int c
     }
   const int best = index_of_least(misfit);
   const double limit = limits.max_corner_misfit * edge_px;
-  const double next = std::min(misfit[(best + 2) % 3], misfit[(best + 1) % 3]);
-  const double ratio = limits.max_ambiguity_ratio;
-  return {best, misfit[best] < limit * limit, misfit[best] < ratio * ratio * next};
+  return {best, misfit[best] < limit * limit};
 }
 
 // The corners of cell i by its map; vectors_mm (U, 3, 2) from the layout's centers to the corners.
@@ -130,7 +128,7 @@ CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> ve
   // clockwise in the image a cell's corners run 0, 2, 1, from the back 0, 1, 2
   const int corner_step = cells.mirrored ? 1 : 2;
   Array<std::int32_t, 2> ids({count, 3});
-  Array<double, 3> corner_px({count, 3, 2}), rejected_px({count, 3, 2}, NOWHERE);
+  Array<double, 3> corner_px({count, 3, 2});
   Array<double, 1> edge({count});
   Array<bool, 1> fitted({count});
   for (Index n = 0; n < count; ++n) {
@@ -147,20 +145,17 @@ CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> ve
     Triangle turned;  // by the layout's corners
     for (int k = 0; k < 3; ++k) turned[k] = triangle[(fit.first + corner_step * k) % 3];
     fill_triangle(corner_px, n, fit.is_fitted ? turned : predicted);
-    if (!fit.is_fitted && fit.is_clear) fill_triangle(rejected_px, n, turned);
     fitted[n] = fit.is_fitted;
   }
-  return {std::move(ids), std::move(corner_px), std::move(edge), std::move(fitted), std::move(rejected_px)};
+  return {std::move(ids), std::move(corner_px), std::move(edge), std::move(fitted)};
 }
 
 MergedCornerArrays average_corners(const CellCorners& corners, Index count, const CornerLimits& limits) {
   const auto sums = corner_sums(corners, count, limits.predicted_weight);
   Array<double, 2> xy({count, 2}, NOWHERE);
   Array<double, 1> edge({count}, NOWHERE);
-  Array<bool, 1> unmatched({count});
   for (Index m = 0; m < count; ++m) {
     const double weight = sums(m, WEIGHT);
-    unmatched[m] = 0.0 < weight && weight < FITTED_WEIGHT;
     if (weight > 0.0) {
       xy(m, 0) = sums(m, X) / weight;
       xy(m, 1) = sums(m, Y) / weight;
@@ -168,33 +163,7 @@ MergedCornerArrays average_corners(const CellCorners& corners, Index count, cons
     }
   }
   auto agreeing = update_disagreeing_and_count(corners, edge, xy, limits);
-  return {std::move(xy), std::move(edge), std::move(agreeing), std::move(unmatched)};
-}
-
-void update_unmatched_markers(View<double, 2> xy_px, View<const double, 1> edge_px,
-                              View<const bool, 1> agreed, View<const bool, 1> unmatched,
-                              const CellCorners& corners, View<const double, 2> marker_mm,
-                              View<const std::int32_t, 2> table, const CornerLimits& limits) {
-  Array<double, 2> agreed_xy{View<const double, 2>(xy_px)};
-  for (Index m = 0; m < agreed.size(); ++m)
-    if (!agreed[m]) agreed_xy[m].fill(NOWHERE);
-  const auto predicted = localmap::predict_markers(agreed_xy, unmatched, marker_mm, table, limits.prediction);
-  const auto expected = predicted.xy_px.view();
-  for (Index n = 0; n < corners.ids.size(); ++n)
-    for (int k = 0; k < 3; ++k) {
-      const std::int32_t m = corners.ids(n, k);
-      const double variance = predicted.variance_px2[m] * (1.0 + predicted.leverage[m]);
-      const double deviation = limits.max_predicted_deviation * edge_px[m];
-      if (!unmatched[m] || !(variance < deviation * deviation)) continue;
-      const double distance = std::sqrt(squared_distance(point_of(xy_px, m), point_of(expected, m)));
-      const double limit =
-          std::min(limits.max_predicted_distance * edge_px[m], limits.max_distance_ratio * distance);
-      const PlanePoint corner{corners.rejected_px(n, k, 0), corners.rejected_px(n, k, 1)};
-      if (squared_distance(corner, point_of(expected, m)) < limit * limit) {
-        xy_px(m, 0) = corner.x;
-        xy_px(m, 1) = corner.y;
-      }
-    }
+  return {std::move(xy), std::move(edge), std::move(agreeing)};
 }
 
 }  // namespace cmp::numbering
