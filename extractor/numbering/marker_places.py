@@ -25,14 +25,12 @@ class CornerLimits(NamedTuple):
     Attributes:
         max_corner_misfit: in edges, between a triangle's corner and its prediction by the cell's neighbours. Measured:
             rule "corner misfit".
-        max_corner_spread: in edges, between a corner and the mean of its marker's corners. Measured: rule "corner
-            spread".
-        max_agreed_spread: in the triangle's shortest edge, the same for corners that agree. Chosen.
+        max_agreed_spread: in the triangle's shortest edge, between a corner and the mean of its marker's corners, where
+            these agree. Chosen.
         predicted_weight: of a predicted corner, relative to a corner of a fitted triangle. Chosen.
     """
 
     max_corner_misfit: float = 0.28
-    max_corner_spread: float = 0.3
     max_agreed_spread: float = 0.2
     predicted_weight: float = 0.05
 
@@ -45,7 +43,7 @@ class InitialMarkers:
     """Numbered markers before refinement.
 
     Attributes:
-        xy_px: (M, 2) float64, the means of the corners, NaN where there is none or they disagree.
+        xy_px: (M, 2) float64, the means of the corners, NaN where there is none.
         edge_px: (M,) float64, the mean length of the edges at each marker, NaN where there is none.
         agreed: (M,) bool, all triangles that the pattern has there were found and agree, or at least two.
         is_intact: (M,) bool, all triangles that the pattern has there were found and agree, and these are at least two.
@@ -95,7 +93,7 @@ class _MergedCorners(NamedTuple):
     """The corners merged at each of M markers.
 
     Attributes:
-        xy_px: (M, 2) float64, weighted means of the corners; NaN where there is none, or they disagree.
+        xy_px: (M, 2) float64, weighted means of the corners; NaN where there is none.
         edge_px: (M,) float64, weighted means of the edges, NaN where there is none.
         agreeing: (M,) int64, how many fitted triangles agree.
     """
@@ -106,10 +104,10 @@ class _MergedCorners(NamedTuple):
 
 
 def merge_corners(cells: Cells, numbering: Numbering, lattice: Lattice) -> InitialMarkers:
-    """Merge the corners at each marker (eqs. 4 and 5: at most one red, green and blue, no farther apart than L).
+    """Merge the corners at each marker (eq. 4: at most one red, green and blue).
 
     A cell's corners are those of its triangle where the triangle agrees with the prediction by the cell's neighbours,
-    else the predicted ones. A marker whose triangles disagree is lost.
+    else the predicted ones.
 
     Args:
         cells: the cells of the image.

@@ -21,14 +21,6 @@ PLACES = (
         "max_corner_misfit: float = 0.28",
         "max_corner_misfit: float = np.inf",
     ),
-    Rule(
-        "corner spread",
-        "a marker whose triangles disagree is lost",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "max_corner_spread: float = 0.3",
-        "max_corner_spread: float = np.inf",
-    ),
 )
 
 REFINEMENT = (

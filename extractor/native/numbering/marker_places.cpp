@@ -91,13 +91,11 @@ Array<double, 2> corner_sums(const CellCorners& corners, Index count, double pre
   return out;
 }
 
-// Sets markers whose triangles disagree to NaN in xy (M, 2); (M,) how many triangles agree.
-Array<std::int64_t, 1> update_disagreeing_and_count(const CellCorners& corners, View<const double, 1> edge,
-                                                    View<double, 2> xy, const CornerLimits& limits) {
-  const Array<double, 2> mean{View<const double, 2>(xy)};
+// (M,) how many of the fitted triangles at each marker agree on its place (M, 2).
+Array<std::int64_t, 1> count_agreeing(const CellCorners& corners, View<const double, 2> xy,
+                                      const CornerLimits& limits) {
   const double agreed2 = limits.max_agreed_spread * limits.max_agreed_spread;
   Array<std::int64_t, 1> agreeing({xy.size()}, 0);
-  const View<const double, 2> means = mean;
   const auto agreed = agreeing.view();
   const auto ids = corners.ids;
   for (Index n = 0; n < corners.ids.size(); ++n) {
@@ -108,10 +106,7 @@ Array<std::int64_t, 1> update_disagreeing_and_count(const CellCorners& corners, 
       shortest = std::min(shortest, squared_distance(corner[k], corner[(k + 1) % 3]));
     for (int k = 0; k < 3; ++k) {
       const std::int32_t m = ids(n, k);
-      const double square = squared_distance(corner[k], point_of(means, m));
-      const double limit = limits.max_corner_spread * edge[m];
-      if (square > limit * limit) xy(m, 0) = xy(m, 1) = NOWHERE;
-      agreed[m] += square < agreed2 * shortest;
+      agreed[m] += squared_distance(corner[k], point_of(xy, m)) < agreed2 * shortest;
     }
   }
   return agreeing;
@@ -162,7 +157,7 @@ MergedCornerArrays average_corners(const CellCorners& corners, Index count, cons
       edge[m] = sums(m, EDGE) / weight;
     }
   }
-  auto agreeing = update_disagreeing_and_count(corners, edge, xy, limits);
+  auto agreeing = count_agreeing(corners, xy, limits);
   return {std::move(xy), std::move(edge), std::move(agreeing)};
 }
 

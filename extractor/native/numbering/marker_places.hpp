@@ -10,11 +10,11 @@ namespace cmp::numbering {
 
 // Limits of corners; explained in extractor/numbering/marker_places.py.
 struct CornerLimits {
-  double max_corner_misfit, max_corner_spread, max_agreed_spread, predicted_weight;
+  double max_corner_misfit, max_agreed_spread, predicted_weight;
 
   template <class F>
   static CornerLimits read(const F& f) {
-    return {f["max_corner_misfit"], f["max_corner_spread"], f["max_agreed_spread"], f["predicted_weight"]};
+    return {f["max_corner_misfit"], f["max_agreed_spread"], f["predicted_weight"]};
   }
 };
 
