@@ -53,8 +53,6 @@ class RepairLimits(NamedTuple):
             "repair by layer".
         max_leverage: of the neighbours' errors on a repaired marker. Measured: rule "repair by rings".
         max_rim_leverage: the same on a marker that cells imply. Chosen.
-        outer_ring_error: possible error of the outer ring where too little of the inner ring can confirm it. Measured:
-            rule "inner ring".
         model_deviation: deviation of a smooth surface from a quadratic map. Chosen.
         fitted_model_sigmas: such deviations that are added to a layer's residual before it is compared with
             ``max_fitted_deviation``. Chosen.
@@ -75,7 +73,6 @@ class RepairLimits(NamedTuple):
     max_fitted_deviation: float = 0.05
     max_leverage: float = 1.2
     max_rim_leverage: float = 2.0
-    outer_ring_error: float = 0.04
     model_deviation: float = 0.012
     fitted_model_sigmas: float = 3.0
     mild_error: float = 1.6

@@ -147,12 +147,4 @@ COMPLETE = (
         "else if (variance >= 0.0) {",
         "else if (false) {",
     ),
-    Rule(
-        "inner ring",
-        "a repair is refused where the inner ring alone predicts another place",
-        "accuracy",
-        "extractor/native/complete/repair.cpp",
-        "unconfirmed ? ring_error : (dx * dx + dy * dy) / 4;",
-        "unconfirmed ? 0.0 : 0.0 * (dx + dy);",
-    ),
 )
