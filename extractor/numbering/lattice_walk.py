@@ -28,8 +28,6 @@ from extractor.result import Origin, Reason
 MIN_SCORE_LEAD = 2
 # neighbours that a second pad misses more than the best; an outline in view is many. Chosen
 MAX_MORE_MISSING = 2
-# of the whitest candidate; less white ones are no white cells. Measured: rule "relative whiteness"
-MIN_RELATIVE_WHITENESS = 0.75
 # A component of the mesh is this pattern if it shows this share of the pattern's cells and hardly any cell is outside.
 MIN_LAYOUT_SHARE = 0.06
 MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; chosen
@@ -104,9 +102,7 @@ class _Candidate(NamedTuple):
         score: ``inside`` minus penalties.
         missing: see ``LayoutPlacement``.
         fits: hardly any walked cell lies outside the layout.
-        white: whiteness of the white cell.
         component: signed number of the component of the mesh.
-        white_adjacent: the component touches the white cell.
         numbering: the numbering.
     """
 
@@ -114,9 +110,7 @@ class _Candidate(NamedTuple):
     score: int
     missing: int
     fits: bool
-    white: float
     component: int
-    white_adjacent: bool
     numbering: Numbering
 
 
@@ -147,8 +141,8 @@ def number_cells(
     """Stage 7: number the component of the mesh that holds the white cell or shows the whole outline.
 
     If several places of a component may be the white cell, the reference is the one with the most cells inside the
-    layout and the fewest outside. If components disagree, the whiter cell is the reference. The numbering is in doubt
-    if neither rule separates the candidates, or if another white cell has the surroundings of a reference, too.
+    layout and the fewest outside. The numbering is in doubt if that does not separate the candidates, or if another
+    white cell has the surroundings of a reference, too.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.
@@ -187,10 +181,8 @@ def _select_candidate(found: list[_Candidate], min_cells: float, distance_px: fl
 
     It is in doubt if a candidate with the white cell farther away than ``distance_px`` is nearly as good.
     """
-    white = MIN_RELATIVE_WHITENESS * max((one.white for one in found if one.fits), default=0.0)
-    found = [one for one in found if one.white >= white]
     large = [one for one in found if one.fits and one.inside >= min_cells]
-    best = max(large, key=lambda one: (one.white_adjacent, one.score), default=None)
+    best = max(large, key=lambda one: one.score, default=None)
     if best is None:
         return None
     middle = best.numbering.white_px
@@ -237,9 +229,7 @@ def _score_placement(placement: LayoutPlacement, walk: _WalkedComponent) -> _Can
         score,
         placement.missing,
         placement.fits,
-        placement.white,
         walk.component,
-        is_adjacent,
         numbering,
     )
 
@@ -251,4 +241,4 @@ def _candidate_from_outline(lattice: Lattice, walk: _WalkedComponent) -> _Candid
         return None
     inside, nowhere = int(np.count_nonzero(cell >= 0)), np.full(2, np.nan)
     numbering = Numbering(cell, walk.front < 0, nowhere, walk.conflicts, origin=Origin.OUTLINE)
-    return _Candidate(inside, inside, 0, True, 0.0, 0, False, numbering)
+    return _Candidate(inside, inside, 0, True, 0, numbering)

@@ -22,9 +22,6 @@ from extractor.numbering.white_cell import WhiteCellLayout, WhiteCellLimits
 from extractor.numbering.whiteness import LIMITS as WHITENESS_LIMITS
 from extractor.numbering.whiteness import WhitenessLimits, measure_inks
 
-# of the brightest; a compressed black cell filled by blur stays below. Measured: rule "relative brightness"
-MIN_RELATIVE_BRIGHTNESS = 0.6
-
 
 class WhiteSearchLimits(NamedTuple):
     """Limits of the search.
@@ -69,7 +66,6 @@ class LayoutPlacement(NamedTuple):
         missing: how often a neighbour of a walked cell lies in the layout and in the image, but was not found.
         fits: hardly any walked cell lies outside the layout.
         white_px: (2,) the center of the white cell.
-        white: its whiteness: its weakest channel, relative to the ink with most of that channel.
         white_adjacent: walked cells touch the white cell.
     """
 
@@ -79,7 +75,6 @@ class LayoutPlacement(NamedTuple):
     missing: int
     fits: bool
     white_px: NDArray[np.float64]
-    white: float
     white_adjacent: bool
 
 
@@ -92,7 +87,6 @@ class _WhiteCandidates(NamedTuple):
         inside: (P,) int64, how many known cells lie in the layout; 0 where the white cell is not there.
         missing: (P,) int64, see ``LayoutPlacement``.
         center_px: (P, 2) float64, the center of the white cell, NaN where it is not there.
-        brightness, whiteness: (P,) float64.
         fits: (P,) bool, hardly any known cell lies outside the layout.
     """
 
@@ -101,8 +95,6 @@ class _WhiteCandidates(NamedTuple):
     inside: NDArray[np.int64]
     missing: NDArray[np.int64]
     center_px: NDArray[np.float64]
-    brightness: NDArray[np.float64]
-    whiteness: NDArray[np.float64]
     fits: NDArray[np.bool_]
 
 
@@ -130,7 +122,6 @@ def placements_by_white_cell(
         lattice.layers, lattice.cell_lookup, *lattice.white_cell_frame, lattice.center_mm
     )
     found = _WhiteCandidates(*native.search_white_cell(image, center, axial, known, inks, layout, LIMITS))
-    brightest = found.brightness[found.fits].max(initial=0.0)
     return [
         LayoutPlacement(
             found.cell[n],
@@ -139,9 +130,7 @@ def placements_by_white_cell(
             int(found.missing[n]),
             bool(found.fits[n]),
             found.center_px[n],
-            float(found.whiteness[n]),
             found.ring == 0,
         )
         for n in np.flatnonzero(found.inside)
-        if found.brightness[n] > MIN_RELATIVE_BRIGHTNESS * brightest
     ]

@@ -22,22 +22,6 @@ NUMBERING = (
         "return of_layout",
     ),
     Rule(
-        "relative whiteness",
-        "places less white than the whitest are no white cells",
-        "no wrong id",
-        "extractor/numbering/lattice_walk.py",
-        "found = [one for one in found if one.white >= white]",
-        "",
-    ),
-    Rule(
-        "white beside",
-        "a white cell that touches walked cells goes before a farther one",
-        "no wrong id",
-        "extractor/numbering/lattice_walk.py",
-        "key=lambda one: (one.white_adjacent, one.score)",
-        "key=lambda one: one.score",
-    ),
-    Rule(
         "rivals",
         "a second place with the surroundings of the white cell makes the numbering doubtful",
         "no wrong id",
@@ -84,14 +68,6 @@ NUMBERING = (
         "extractor/numbering/white_search.py",
         "min_black_share: float = 0.8",
         "min_black_share: float = 0.0",
-    ),
-    Rule(
-        "relative brightness",
-        "places less bright than the brightest are no white cells",
-        "no wrong id",
-        "extractor/numbering/white_search.py",
-        "if found.brightness[n] > MIN_RELATIVE_BRIGHTNESS * brightest",
-        "",
     ),
     Rule(
         "white triangle",
