@@ -27,6 +27,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
 
+from benchmarks.ablation.report import comparison_row, publish
 from benchmarks.suites.ablation.comparison import Change, Comparison, compare
 from benchmarks.suites.ablation.pictures import POOLED, PROVOKING, KeptPicture, keep_pictures
 from benchmarks.suites.ablation.rule import Kind, Rule
@@ -134,13 +135,6 @@ def _interval(change: Change, unit: float, digits: int) -> str:
     return f"{value:+.{digits}f} [{low:+.{digits}f}, {high:+.{digits}f}]"
 
 
-def _row(found: Comparison) -> dict[str, object]:
-    judged = ("wrong", "lost", "rms_px", "typical_px", "departure", "beyond", "ms")
-    changes = {name: getattr(found, name)._asdict() for name in judged}
-    named = {"rule": found.rule.name, "stage": found.rule.stage, "kind": found.rule.kind}
-    return {**found._asdict(), **changes, **named, "verdict": found.verdict}
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Draw the pictures, read them with the full reader and without each rule, print the table."""
     parser = argparse.ArgumentParser(
@@ -154,6 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of each suite")
     parser.add_argument("--seed", type=int, metavar="S", help="of all random choices")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every row")
+    parser.add_argument("--publish", action="store_true", help="put the rows into docs/measured and its page")
     parser.add_argument("--processes", type=int, default=1, metavar="N", help="rules tried at the same time")
     parser.add_argument("--list", action="store_true", help="print the rules, try none")
     options = parser.parse_args(arguments)
@@ -167,6 +162,8 @@ def main(arguments: list[str] | None = None) -> int:
         seed = commit_seed() if options.seed is None else options.seed
     except ValueError as error:
         parser.error(str(error))
+    if options.together and options.publish:
+        parser.error("--together tells nothing of single rules; leave --publish out")
     if seed < 0:
         parser.error(f"--seed is {seed}; it must be 0 or more")
     started, found = time.perf_counter(), []
@@ -189,8 +186,14 @@ def main(arguments: list[str] | None = None) -> int:
             print(comparison_line(comparison), flush=True)
     print(f"{len(pictures)} pictures, seed {seed}, {options.preset}; {time.perf_counter() - started:.0f} s")
     print(conditions_text())
+    rows = [comparison_row(comparison) for comparison in found]
     if options.json:
-        write_json(options.json, {"seed": seed, "rows": [_row(comparison) for comparison in found]})
+        write_json(options.json, {"seed": seed, "rows": rows})
+    if options.publish:
+        named = "".join(f' --rule "{name}"' for name in options.rule or ())
+        command = f"python -m benchmarks.ablation --preset {options.preset} --pictures {options.pictures} --seed {seed}"
+        for path in publish(rows, command + named):
+            print(f"wrote {path}")
     return 0
 
 

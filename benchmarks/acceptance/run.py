@@ -2,12 +2,12 @@
 
     python -m benchmarks.acceptance [--pictures N] [--seed S] [--threshold NAME] [--publish]
 
-Pictures of random damage, and a fifth as many of the suites stress and camera each, are drawn once and read at every
-value of the threshold. "wrong" are positions more than half of the shortest edge off, "95 % below" is their one-sided
-bound by Clopper and Pearson, "lost" are visible markers that are not reported. A value holds if no id is wrong, the
-bound is at most 10 in a million, and at most 5 % more are lost than at the reader's own value. Without a seed, that of
-the commit's hash is taken. A bound of 10 in a million needs 300,000 reported markers without a wrong one, which is a
-thousand pictures.
+Pictures of random damage, and four of the suites stress and camera each for every 21 of them, are drawn once and read
+at every value of the threshold. "wrong" are positions more than half of the shortest edge off, "95 % below" is their
+one-sided bound by Clopper and Pearson, "lost" are visible markers that are not reported. A value holds if no id is
+wrong, the bound is at most 10 in a million, and at most 5 % more are lost than at the reader's own value. Without a
+seed, that of the commit's hash is taken. A bound of 10 in a million needs 300,000 reported markers without a wrong
+one, which is a thousand pictures.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from benchmarks.support.command import publishing_parser, wide_console
 from benchmarks.support.machine import conditions_text, write_json
 from benchmarks.support.published import write_published
 
-PICTURES, QUICK_PICTURES = 1200, 21
-OTHER_SHARE = 5  # one picture of stress and of camera each for so many of damage
+PICTURES, QUICK_PICTURES = 1050, 21
+OTHERS_A_DRAW = 4  # pictures of stress and of camera each, for one of damage of every kind and pattern
 PRESET = "balanced"
 WIDTH = 110
 
@@ -71,7 +71,7 @@ class Threshold(NamedTuple):
 
 THRESHOLDS = {
     "max_distance": Threshold(
-        "extractor/complete/consistency_filter.py", "max_distance", (0.04, 0.06, 0.1, 0.25, 0.4, 1.0)
+        "extractor/complete/consistency_filter.py", "max_distance", (0.06, 0.1, 0.25, 0.4, 1.0)
     ),
     "max_deviation": Threshold("extractor/refine/acceptance.py", "max_deviation", (0.01, 0.02, 0.06, 0.15)),
     "max_shift": Threshold("extractor/refine/acceptance.py", "max_shift", (0.1, 0.18, 0.4, 0.8)),
@@ -80,11 +80,11 @@ THRESHOLDS = {
 
 def keep_all(count: int, seed: int, folder: Path) -> Iterator[KeptPicture]:
     """Pictures of damage, as many as asked for, and those of the other suites."""
-    draws = -(-count // (len(RANDOM_KINDS) * len(PATTERNS)))
-    damage = islice(random_damage_cases(seed, draws), count)
+    a_draw = len(RANDOM_KINDS) * len(PATTERNS)
+    damage = islice(random_damage_cases(seed, -(-count // a_draw)), count)
     yield from keep_cases("damage", damage, f"damage-{seed}", folder)
     for suite in ("stress", "camera"):
-        yield from keep_pictures(suite, max(count // OTHER_SHARE, 1), seed, folder)
+        yield from keep_pictures(suite, max(count * OTHERS_A_DRAW // a_draw, 1), seed, folder)
 
 
 def curve(threshold: Threshold, values: Sequence[float], pictures: Sequence[KeptPicture]) -> Iterable[Point]:

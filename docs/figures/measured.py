@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks import accuracy, extraction
+from benchmarks.ablation import report as ablation
 from benchmarks.camera import page as camera
 from benchmarks.datasets import run as datasets
 from benchmarks.suites.comparison.measure import MethodResult
@@ -63,6 +64,7 @@ def pages() -> dict[Path, str]:
         | extraction.markdown(read_measured("extraction"))
         | datasets.markdown(read_measured("datasets"))
         | camera.documentation_blocks(read_measured("camera"))
+        | ablation.documentation_blocks(read_measured(ablation.NAME))
     )
 
 
