@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from benchmarks.acceptance.points import MOST_LOST, MOST_WRONG, Point
-from benchmarks.support.published import MEASURED_FOLDER, read_measured
+from benchmarks.support.published import read_measured
 
 NAME, IMAGE = "acceptance", "acceptance.png"
 BLUE, GREY = "#0072b2", "#444444"
@@ -81,40 +81,35 @@ def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
 
 
 def figures() -> dict[str, bytes]:
-    """Name in docs/images -> PNG, from docs/measured/acceptance.json; empty as long as there is no such file."""
-    if not (MEASURED_FOLDER / f"{NAME}.json").exists():
-        return {}
+    """Name in docs/images -> PNG, from docs/measured/acceptance.json."""
     return {IMAGE: curve_picture(read_measured(NAME))}
 
 
 def curve_picture(measured: Mapping[str, Any]) -> bytes:
-    """PNG: wrong positions per million with their upper bounds, against lost markers over today's."""
+    """PNG: over the threshold, wrong positions a million with their upper bounds, and lost markers over today's."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
     points, own = measured_points(measured), own_point(measured)
-    figure, axis = pyplot.subplots(figsize=(7.2, 4.0))
-    lost = [one.lost / own.lost for one in points]
+    at = [one.threshold for one in points]
     share = [one.wrong_per_million for one in points]
     above = [one.upper_per_million - one.wrong_per_million for one in points]
-    axis.errorbar(
-        lost, share, yerr=[[0.0] * len(above), above], fmt="o-", color=BLUE, capsize=4, markersize=5
+    figure, (wrong, lost) = pyplot.subplots(2, 1, sharex=True, figsize=(7.2, 4.4))
+    wrong.errorbar(at, share, yerr=[[0.0] * len(above), above], fmt="o", color=BLUE, capsize=4, markersize=5)
+    wrong.axhline(MOST_WRONG, color=GREY, linestyle="--", linewidth=1)
+    wrong.set(ylabel="wrong a million,\n95 % below", ylim=(0, 1.2 * MOST_WRONG))
+    lost.plot(at, [one.lost / own.lost for one in points], "o-", color=BLUE, markersize=5)
+    lost.axhline(MOST_LOST, color=GREY, linestyle="--", linewidth=1)
+    lost.set(
+        xscale="log", xlabel="threshold, edges; the reader's own is dotted", ylabel="lost,\nover today's"
     )
-    for place, one in zip(zip(lost, share, strict=True), points, strict=True):
-        weight = "bold" if one.threshold == own.threshold else "normal"
-        axis.annotate(
-            f"{one.threshold:g}", place, xytext=(5, 4), textcoords="offset points", fontsize=8, weight=weight
-        )
-    axis.axhline(MOST_WRONG, color=GREY, linestyle="--", linewidth=1)
-    axis.axvline(MOST_LOST, color=GREY, linestyle="--", linewidth=1)
-    axis.set(
-        xlabel="lost markers, over those at the reader's own threshold (bold)",
-        ylabel="wrong positions a million, 95 % below",
-    )
-    axis.set_ylim(bottom=0)
-    axis.grid(alpha=0.25)
+    lost.set_xticks(at, [f"{value:g}" for value in at])
+    lost.minorticks_off()
+    for axis in (wrong, lost):
+        axis.axvline(own.threshold, color=GREY, linestyle=":", linewidth=1)
+        axis.grid(alpha=0.25)
     figure.tight_layout()
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=100, metadata={"Software": None})

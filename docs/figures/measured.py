@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks import accuracy, extraction
 from benchmarks.ablation import report as ablation
+from benchmarks.acceptance import report as acceptance
 from benchmarks.camera import page as camera
 from benchmarks.datasets import run as datasets
 from benchmarks.suites.comparison.measure import MethodResult
@@ -43,7 +44,7 @@ def _compared() -> list[MethodResult]:
 
 def figures() -> dict[str, bytes]:
     """Name in docs/images -> PNG."""
-    return {"speed-error.png": comparison_picture(_compared())}
+    return {"speed-error.png": comparison_picture(_compared())} | acceptance.figures()
 
 
 def pages() -> dict[Path, str]:
@@ -65,6 +66,7 @@ def pages() -> dict[Path, str]:
         | datasets.markdown(read_measured("datasets"))
         | camera.documentation_blocks(read_measured("camera"))
         | ablation.documentation_blocks(read_measured(ablation.NAME))
+        | acceptance.documentation_blocks(read_measured(acceptance.NAME))
     )
 
 

@@ -24,7 +24,8 @@ class ConsistencyLimits(NamedTuple):
     Attributes:
         max_rounds: of rejection; each round drops the worst marker of every neighbourhood. Measured: rule "ring
             outliers".
-        max_distance: between a marker and its prediction by two rings. Chosen.
+        max_distance: between a marker and its prediction by two rings. Measured:
+            `python -m benchmarks.acceptance`.
         max_agreed_unexplained_distance: the same where two triangles agree and synthesis explains nothing. Measured:
             rule "agreed unexplained".
         max_predicted_deviation: of the prediction of a marker that only two triangles confirm. Measured: rule
