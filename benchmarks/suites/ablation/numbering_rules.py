@@ -145,6 +145,14 @@ GAPS = (
         "    state.is_consistent[i] = block[i] == reference || cell[i] >= 0;\n    selected[i] = false;\n",
     ),
     Rule(
+        "firm contacts",
+        "large blocks of cells are not joined by contacts that no third cell confirms",
+        "no wrong id",
+        "extractor/native/numbering/gaps/gap_check.cpp",
+        "blocks_of(neighbours, selected, limits)",
+        "connected_components(neighbours, selected)",
+    ),
+    Rule(
         "single cells",
         "single cells across a gap continue the pattern, too",
         "no wrong id",

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
+import numpy as np
 import pytest
 
+from benchmarks.suites.ablation.provoking import LARGE_LAYERS, LARGE_PITCH_PX, provoking_cases
 from benchmarks.suites.scoring.reading import cached_extractor
 from benchmarks.suites.scoring.score import MarkerScore, score_markers
 from benchmarks.suites.stress.damage import missing_hole, with_scratches
@@ -37,6 +41,17 @@ def test_a_part_beyond_a_gap_is_numbered_no_step_aside(pattern: str, width: floa
         figures = read(frame.damaged(scratches=gaps + (narrow if number % 2 else ())))
         assert figures.wrong == 0
         assert figures.kept >= (least - 0.02 * (number % 2)) * figures.sure
+
+
+@pytest.mark.slow
+def test_a_pair_of_cells_that_seems_to_touch_across_a_scratch_joins_no_parts() -> None:
+    """10,981 markers in two parts, one of them walked to a step aside: one wrong contact made it part of the other."""
+    case = next(islice(provoking_cases(880231), 178, None))
+    shot = case.shoot()
+    markers = cached_extractor(case.layout.pattern, LARGE_LAYERS).extract(shot.image)
+    error_px = np.linalg.norm(markers.xy_px - shot.truths[0].marker_xy_px, axis=1)
+    assert np.nanmax(error_px) < 0.5 * LARGE_PITCH_PX
+    assert np.isfinite(error_px).mean() > 0.97
 
 
 @pytest.mark.parametrize(
