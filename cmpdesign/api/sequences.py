@@ -114,7 +114,7 @@ class Followed:
         written: all files that were written, ``output`` first.
         summary: the JSON object of the summary beside it; empty if no frame could be read.
         ended_early: why the run ended before the source's end; "" for a complete run.
-        warnings: what makes the results doubtful.
+        warnings: reasons to doubt the results.
     """
 
     output: Path
