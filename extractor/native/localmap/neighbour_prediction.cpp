@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "localmap/ring_maps.hpp"
+#include "numeric/dense_systems.hpp"
 
 namespace cmp::localmap {
 
@@ -27,34 +28,6 @@ struct Neighbours {
   std::array<Neighbour, layout::RING_MARKERS> items;
   Index count = 0;
 };
-
-// Replaces a matrix by its Cholesky factor; false when the neighbours do not determine the map.
-bool update_to_cholesky_factor(CubicMatrix& matrix, double min_pivot) {
-  for (Index i = 0; i < CUBIC_TERMS; ++i)
-    for (Index j = 0; j <= i; ++j) {
-      double total = matrix[i][j];
-      for (Index k = 0; k < j; ++k) total -= matrix[i][k] * matrix[j][k];
-      if (i != j) {
-        matrix[i][j] = total / matrix[j][j];
-        continue;
-      }
-      if (!(total > min_pivot)) return false;
-      matrix[i][i] = std::sqrt(total);
-    }
-  return true;
-}
-
-// Replaces a vector by the solution with a Cholesky factor.
-void update_to_solution(const CubicMatrix& factor, CubicTerms& vector) {
-  for (Index i = 0; i < CUBIC_TERMS; ++i) {
-    for (Index k = 0; k < i; ++k) vector[i] -= factor[i][k] * vector[k];
-    vector[i] /= factor[i][i];
-  }
-  for (Index i = CUBIC_TERMS - 1; i >= 0; --i) {
-    for (Index k = i + 1; k < CUBIC_TERMS; ++k) vector[i] -= factor[k][i] * vector[k];
-    vector[i] /= factor[i][i];
-  }
-}
 
 // The known neighbours of marker m; x and y are in units of their mean distance.
 Neighbours known_neighbours(View<const double, 2> xy_px, Index m, View<const double, 2> marker_mm,
@@ -82,24 +55,24 @@ CubicTerms cubic_terms(double x, double y) {
 // The residual variance per axis, px^2, of the cubic map through the neighbours.
 double cubic_variance_of(const Neighbours& neighbours, double min_pivot) {
   CubicMatrix normal{};
-  CubicTerms side_x{}, side_y{};
+  std::array<CubicTerms, 2> sides{};  // for x and y
   std::array<CubicTerms, layout::RING_MARKERS> rows;
   for (Index k = 0; k < neighbours.count; ++k) {
     const Neighbour& own = neighbours.items[k];
     const CubicTerms row = cubic_terms(own.x, own.y);
     for (Index a = 0; a < CUBIC_TERMS; ++a) {
-      side_x[a] += row[a] * own.u;
-      side_y[a] += row[a] * own.v;
+      sides[0][a] += row[a] * own.u;
+      sides[1][a] += row[a] * own.v;
       for (Index b = 0; b <= a; ++b) normal[a][b] += row[a] * row[b];
     }
     rows[k] = row;
   }
-  if (!update_to_cholesky_factor(normal, min_pivot)) return INFINITE;
-  update_to_solution(normal, side_x);
-  update_to_solution(normal, side_y);
+  const View<double, 2> gram(normal[0].data(), {CUBIC_TERMS, CUBIC_TERMS});
+  const View<double, 2> right(sides[0].data(), {2, CUBIC_TERMS});
+  if (!numeric::update_to_cholesky_solution(gram, right, CUBIC_TERMS, min_pivot)) return INFINITE;
   double squares = 0.0;
   for (const bool is_x : {true, false}) {
-    const CubicTerms& side = is_x ? side_x : side_y;
+    const CubicTerms& side = is_x ? sides[0] : sides[1];
     for (Index k = 0; k < neighbours.count; ++k) {
       double misfit = is_x ? neighbours.items[k].u : neighbours.items[k].v;
       for (Index a = 0; a < CUBIC_TERMS; ++a) misfit -= rows[k][a] * side[a];
