@@ -20,14 +20,14 @@ class TriangleEdgeLimits(NamedTuple):
     """Limits of the measurement of edges.
 
     Attributes:
-        first_profile: of an edge, from its start to the first profile, and from the second one to its end.
+        first_profile: share of an edge from its start to the first profile, and from the second profile to its end.
         half_profile: samples on each side of an edge.
         border_margin_px: from profiles to the last row and column; more than half a sub-pixel step.
         profile_reach: half length of a profile in the first pass, in vectors from the cell's center to the edge's
             middle.
         fine_reach_px: half length of a profile, about; longer profiles are followed by shorter ones.
         next_reach: half length of a profile, relative to the pass before.
-        max_passes: the first one and those with shorter profiles.
+        max_passes: number of passes: the first pass and the passes with shorter profiles.
         ink_radius: of the disc in which the ink's color is measured, relative to the corner's distance from the center.
         background_place: of the disc of the color outside an edge, in vectors from the cell's center to the edge's
             middle.
@@ -67,7 +67,7 @@ def update_triangle_corners(
 ) -> None:
     """Move the corners of triangles to the intersections of their measured edges.
 
-    The first profiles reach across the cell; for large cells shorter ones follow.
+    The first profiles reach across the cell; for large cells shorter profiles follow.
 
     Args:
         view: the image.

@@ -1,4 +1,4 @@
-"""The quality of an image, measured at the middles of cells: what limits the reading of its markers."""
+"""The quality of an image, measured at the middles of cells: the properties that limit the reading."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class QualityLimits(NamedTuple):
     """Limits of the quality.
 
     Attributes:
-        clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255.
-        dim_quantile: of the cells' light, that is the dimmest; the brightest are as many.
+        clipped_value: value of 255, from which on a cell's mean counts as clipped; noise lowers the mean below 255.
+        dim_quantile: share of the cells that count as the dimmest; the brightest cells are the same number.
     """
 
     clipped_value: float = 253.0
@@ -87,7 +87,7 @@ def measure_quality(
 
 
 def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None) -> Quality:
-    """The quality of an image in which no cell was numbered; ``cells`` are those that were found, if any."""
+    """The quality of an image in which no cell was numbered; ``cells`` are the found cells, if any."""
     clipping = float(
         (view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE].max(axis=2) >= LIMITS.clipped_value).mean()
     )

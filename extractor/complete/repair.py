@@ -1,10 +1,12 @@
-"""Stage 8: markers that contradict their neighbours are dropped, and lost ones repaired where that is safe.
+"""Stage 8: markers that contradict their neighbours are dropped, and lost markers are repaired where their neighbours
+leave no doubt.
 
-Mild omission (the article's eq. 6): the triangles around a lost marker imply its place; here all markers of two rings
-do, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
-sextant, read at equidistant places. A marker that neither predicts within a tenth of an edge stays lost.
+Mild omission (the article's eq. 6): the triangles around a lost marker give its place; here all markers of two rings
+give it, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
+sextant, read at equidistant places. A marker that neither method predicts within a tenth of an edge stays lost.
 
-An uncertain marker, as under dirt, may be predicted by its rings better than it is measured: both are fused.
+The prediction by the rings of an uncertain marker, as under dirt, may be better than its measurement: both are
+    combined.
 """
 
 from __future__ import annotations
@@ -36,8 +38,9 @@ class RepairLimits(NamedTuple):
 
     Errors of repaired markers against the residual of the fit to their neighbours are from 300 rendered scenes with
     missing cells and dirt on flat, tilted, pressed and twisted patterns: deviation = ``mild_error`` * leverage *
-    residual, as the surface departs the more from the map the farther this extrapolates. A layer's quadratic rests on
-    few markers and may seem to fit better than it does: its variance counts ``heavy_error`` times, and is never below
+    residual, because the surface deviates more from the map the farther the map extrapolates. A layer's quadratic is
+    fitted to
+    few markers, and its residual may be too small: its variance counts ``heavy_error`` times, and is never below
     that of the model. Likewise against the residual of a cubic in nearly whole rings, on the surfaces under balls,
     rings, ribs, wedges and cubes (their true markers, with up to three neighbours removed): 99 % of the errors stay
     below 1.5 deviations of ``cubic_error`` * residual.
@@ -46,7 +49,7 @@ class RepairLimits(NamedTuple):
         max_implied_distance: between the place that cells imply and the prediction by markers.
         implied_deviation: of a place that cells imply.
         max_implied_sigmas: deviations of this distance, from which on the two places contradict each other.
-        border_width: of the image's border, which cuts cells; cells there imply nothing.
+        border_width: width of the image's border, which cuts cells; cells there imply no place.
         mild_support: known neighbours of two rings that make an omission mild.
         min_rim_support: known neighbours of a lost marker that cells imply.
         max_repaired_deviation: of a repaired marker: three such deviations stay below a quarter of an edge.
@@ -88,7 +91,7 @@ LIMITS = RepairLimits()
 
 
 class UnrepairedMarkers(NamedTuple):
-    """What is known of M markers before repair.
+    """M markers before repair.
 
     Attributes:
         xy_px, cov_px2: (M, 2) and (M, 2, 2) float64, NaN where lost; they are written.
@@ -121,7 +124,8 @@ class RepairedMarkers:
 def repair_markers(
     refined: RefinedMarkers, places: InitialMarkers, lattice: Lattice, size: tuple[int, int]
 ) -> RepairedMarkers:
-    """Drop inconsistent markers, repair lost ones that the others predict, and fuse uncertain ones with predictions.
+    """Drop inconsistent markers, repair lost markers that the others predict, and combine uncertain markers with
+    predictions.
 
     Args:
         refined: the markers after refinement.

@@ -12,8 +12,8 @@ class QuadraticMapLimits(NamedTuple):
     """Limits of the map of a detached cell.
 
     Attributes:
-        max_support_distance: in cells, from the nearest support cell; farther away a place is uncertain.
-        max_deviation: in cells, of the predicted place; beyond it the place is uncertain.
+        max_support_distance: in cells, from the nearest support cell; beyond this distance a place is uncertain.
+        max_deviation: in cells, of the predicted place; above this deviation the place is uncertain.
         robust_rounds: of least squares; support cells cut by dirt are outliers.
         exact_misfit: in cells; smaller misfits keep the full weight.
         distance_softening: in squares of the support cells' mean distance; added to the squared distance by which a

@@ -33,7 +33,7 @@ class CornerLimits(NamedTuple):
         min_sharp_share: share of cells with triangles, above which most have one.
         border_px: px, from the image's border; the border cuts off cells with a corner nearer to it.
         predicted_weight: of a predicted corner, relative to a corner of a fitted triangle.
-        max_ambiguity_ratio: of the least misfit to the next rotation's; below it the orientation is clear.
+        max_ambiguity_ratio: of the smallest misfit to the next rotation's; below this ratio the orientation is clear.
         max_predicted_deviation: in edges, of a marker whose prediction confirms a triangle's corner.
         max_predicted_distance: in edges, between that prediction and the corner.
         max_distance_ratio: of that distance to the one between the prediction and the averaged place.
@@ -61,8 +61,8 @@ class InitialMarkers:
     """Numbered markers before refinement.
 
     Attributes:
-        xy_px: (M, 2) float64, the means of the corners, NaN where there is none or they disagree.
-        edge_px: (M,) float64, the mean length of the edges at each marker, NaN where there is none.
+        xy_px: (M, 2) float64, the means of the corners, NaN without corners or where corners disagree.
+        edge_px: (M,) float64, the mean length of the edges at each marker, NaN without edges.
         cells: (C, 3) int32, marker ids of the numbered cells' corners.
         agreed: (M,) bool, all triangles that the pattern has there were found and agree, or at least two.
         is_intact: (M,) bool, all triangles that the pattern has there were found and agree, and these are at least two.
@@ -119,8 +119,8 @@ class _MergedCorners(NamedTuple):
     """The corners merged at each of M markers.
 
     Attributes:
-        xy_px: (M, 2) float64, weighted means of the corners; NaN where there is none, or they disagree.
-        edge_px: (M,) float64, weighted means of the edges, NaN where there is none.
+        xy_px: (M, 2) float64, weighted means of the corners; NaN without corners, or where corners disagree.
+        edge_px: (M,) float64, weighted means of the edges, NaN without edges.
         agreeing: (M,) int64, how many fitted triangles agree.
         cells: (K, 3) int32, marker ids of the cells whose corners are all known; if most are sharp, of those kept.
         is_unmatched: (M,) bool, markers with predicted corners only.
@@ -139,7 +139,8 @@ def merge_corners(
     """Merge the corners at each marker (eqs. 4 and 5: at most one red, green and blue, no farther apart than L).
 
     A cell's corners are those of its triangle where the triangle agrees with the prediction by the cell's neighbours,
-    else the predicted ones. A marker whose triangles disagree is lost. At the pattern's rim all neighbours are on one
+    else the predicted corners. A marker whose triangles disagree is lost. At the pattern's rim all neighbours are on
+    one
     side and predict a bent cell badly: there one corner of a triangle is accepted if the neighbouring markers predict
     it.
 
@@ -183,6 +184,6 @@ def corner_agreement(
 
     Args:
         agreeing: (M,) how many triangles agree at each marker.
-        meeting: (M,) how many the pattern has there.
+        meeting: (M,) how many triangles the pattern has there.
     """
     return (agreeing == meeting) | (agreeing >= 2), (agreeing == meeting) & (agreeing >= 2)

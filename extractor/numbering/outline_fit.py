@@ -16,14 +16,14 @@ class OutlineLimits(NamedTuple):
 
     Attributes:
         min_seen_share: of the layout's cells must be found.
-        max_outside_share: of the cells found may lie outside at the best alignment: dirt in the mesh.
-        min_margin_share: more of them must lie outside at every other alignment, and
-        min_margin_cells: at least so many more.
-        shift_margin: lattice steps, by which shifts may exceed the fitting ones.
-        max_alignments: alignments to try; with more possible ones none is certain.
+        max_outside_share: share of the cells found that may lie outside at the best alignment: dirt in the mesh.
+        min_margin_share: this share more must lie outside at every other alignment, and
+        min_margin_cells: at least this number of cells more.
+        shift_margin: lattice steps, by which shifts may exceed the fitting shifts.
+        max_alignments: alignments to try; with more possible alignments none is certain.
         rim_width: lattice steps from the outermost cells; the cells of this rim are tested first. The result does not
             depend on it.
-        batch_size: cells that are tested between two comparisons with the limit. Nor on this.
+        batch_size: cells that are tested between two comparisons with the limit. The result does not depend on it.
     """
 
     min_seen_share: float = 0.5
@@ -42,7 +42,7 @@ LIMITS = OutlineLimits()
 def align_to_outline(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32] | None:
     """Align connected cells with the layout's outline.
 
-    All rotations by 120 degrees and all shifts that carry every ink onto itself are tried.
+    All rotations by 120 degrees and all shifts that map every ink onto itself are tried.
 
     Args:
         axial: (N, 2) int32, axial coordinates of the connected cells, up to such a rotation and shift;

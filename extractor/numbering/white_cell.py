@@ -55,16 +55,16 @@ class WhiteCellLimits(NamedTuple):
         ridge: of the cells' total weight; regularises the map's curvature where all these cells lie on one side.
         weight_softening: a cell's weight is the inverse of this plus the square of its distance, in units of the
             cells' root mean square distance.
-        min_pivot_share: of the cells' total weight, the least square of the pivot of the slope across; below it the
+        min_pivot_share: of the cells' total weight, the smallest square of the pivot of the slope across; below it the
             cells lie on one line.
         max_predicted_deviation: in edges, of the prediction.
         max_centroid_distance: in edges, from prediction to centroid of the white; the next black cell is at 1.
         min_inside: whiteness within the cell.
         min_corner: whiteness in the corners.
         max_outside: whiteness outside the cell.
-        min_reach: whiteness above the ground, the least of the middle that the other places are compared with.
+        min_reach: smallest whiteness of the middle above the ground; the other places are compared with the middle.
         min_ink_cosine: between a color and an ink, both minus black.
-        min_ink_strength: of an ink's strength above black; weaker colors count as black, a missing cell.
+        min_ink_strength: share of an ink's strength above black; weaker colors count as black, a missing cell.
         sample_radius: of a color sample, relative to the square root of the area spanned by the axial steps.
         points: the places that are sampled.
     """
@@ -90,7 +90,7 @@ LIMITS = WhiteCellLimits()
 
 
 class WhiteCellLayout(NamedTuple):
-    """The layout as needed for the search of the white cell.
+    """The layout for the search of the white cell.
 
     Attributes:
         layers: number of layers.

@@ -1,4 +1,4 @@
-"""The median of a few numbers, as the compiled loops take it."""
+"""The median of a few numbers, by the compiled loops."""
 
 from __future__ import annotations
 
