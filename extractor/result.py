@@ -47,7 +47,9 @@ class Reason(StrEnum):
     REFERENCE_LOST = "reference_lost"  # a pattern whose white cell is not visible
     AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
     SEVERAL_PADS = "several_pads"  # several white cells, each with the surrounding cells of a pattern
-    OTHER_SIDE = "other_side"  # the other side, or red and blue are swapped: the inks do not distinguish the cases
+    OTHER_SIDE = (
+        "other_side"  # the other side, or red and blue are swapped: the inks do not distinguish the cases
+    )
     MIRRORED = "mirrored"  # the pattern's other side, in inks of the palette's hues
     SWAPPED_CHANNELS = "swapped_channels"  # the inks have the palette's hues if red and blue are swapped
     FEW_MARKERS = (

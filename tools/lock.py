@@ -21,7 +21,9 @@ def lock_text() -> str:
     """One line NAME==VERSION for each installed package, in the order of the names."""
     versions = {one.metadata["Name"]: one.version for one in distributions()}
     lines = [
-        f"{name}=={versions[name]}\n" for name in sorted(versions, key=str.lower) if name.lower() not in LEFT_OUT
+        f"{name}=={versions[name]}\n"
+        for name in sorted(versions, key=str.lower)
+        if name.lower() not in LEFT_OUT
     ]
     return HEADER + "".join(lines)
 

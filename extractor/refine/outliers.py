@@ -1,8 +1,10 @@
-"""Markers that contradict their neighbours: dirt that looks like a gridline has moved them.
+"""Markers that contradict their neighbours, because of dirt that looks like a gridline.
 
-Two independent signs must agree: the gridlines of the marker do not look like the pattern, and most gridlines through
-it show that the map would be smooth if the marker were moved by one vector. The marker then starts again from there.
-Sharp bends, at the rim of an object or where it slips, ask for vectors that differ from one gridline to the next.
+Two independent criteria must agree: the gridlines of the marker do not look like the pattern, and most gridlines
+    through
+the marker show that the map would be smooth if the marker were moved by one vector. The marker then starts again from
+the moved place. Sharp bends, at the rim of an object or where it slips, give vectors that differ from one gridline to
+the next.
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ class OutlierLimits(NamedTuple):
         outlier_ratios: shift of an outlier over that of the markers around, of a suspect marker and of any other;
         min_outlier_shifts: and that shift in edges.
         min_agreeing_share: the gridlines of a marker agree on a shift if more than this share of them,
-        min_agreeing_gridlines: and no fewer than so many,
-        agreement_tolerance: ask for one that differs by less than this share of the shift.
+        min_agreeing_gridlines: and no fewer than this number,
+        agreement_tolerance: give a shift that differs by less than this share of the shift.
         extrapolated_rings: of outliers that the markers around are continued to.
         max_rounds: an outlier hides the errors of its neighbours.
         max_place_error: in edges, between a marker's place by its neighbours and a correct initial place.
@@ -68,7 +70,7 @@ def correct_outliers(
         view: the image.
         topology: of the layout.
         estimate: after the first round of profiles.
-        profile_weight: (E,) 0 to 1, how well gridlines look like the pattern.
+        profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         places: of the full image.
     """
     assert estimate.reading is not None
@@ -98,7 +100,7 @@ def find_outliers(
         topology: of the layout.
         estimate: after a round of profiles.
         xy: (M, 2) px, NaN where unknown.
-        profile_weight: (E,) 0 to 1, how well gridlines look like the pattern.
+        profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         edge_px: (M,) the length of the edges at each marker.
 
     Returns:

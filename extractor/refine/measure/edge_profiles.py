@@ -1,6 +1,6 @@
 """Edge profiles: the colors across each gridline as a profile from 1 to 0, and the blur of that profile.
 
-Profiles are read between the corners of a gridline only (``matched_filter``). They are fast, and safe from a start
+Profiles are read between the corners of a gridline only (``matched_filter``). They are fast, and converge from a start
 that is a pixel off.
 """
 
@@ -20,10 +20,10 @@ class EdgeProfileLimits(NamedTuple):
         max_reach: of the cell's height, the reach of a profile to each side.
         max_reach_share: of the distance to the next gridline, the reach of a blur profile; 0.41 in a regular cell.
         middle_share: of the gridline, from its ends to the nearest of the profiles.
-        min_blur_gridlines: clear of other gridlines, below which all gridlines are taken.
+        min_blur_gridlines: number of gridlines clear of others, below which all gridlines are used.
         bilinear_px2: px^2, mean variance that bilinear sampling adds to the blur.
         apparent_blur, true_blur: in units of the cell's height, one for the other. Wide blur mixes the neighbours' inks
-            into the middles that the contrasts are taken from, which makes profiles look too steep (rendered
+            into the middles from which the contrasts are computed, so that profiles look too steep (rendered
             honeycombs). The native code has room for as many.
     """
 

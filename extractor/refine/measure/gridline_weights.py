@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from extractor._native import measure as native
 
-SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge
+SHORTEST_RARITY = 100  # one gridline in this number is shorter than a short edge
 MIN_NOISE = 0.3  # gray levels; rounding alone makes 0.29
 MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
 
@@ -23,7 +23,7 @@ class GridlineWeightLimits(NamedTuple):
         informed_factor: of the prior information about a hidden marker; markers with more count for the median
             information.
         min_information_share: of that median; a marker with less does not guide its neighbours' gridlines.
-        rim_deviation_px: at the rim, a marker with enough weight and a smaller deviation guides them all the same: the
+        rim_deviation_px: at the rim, a marker with enough weight and a smaller deviation still guides them: the
             map of markers on one side only is less precise.
         min_clean_share: of the gridlines with weight 1, from which on the noise is that of all gridlines.
         min_marker_weight: mean weight of the gridlines at a marker, for the marker to count.
@@ -60,7 +60,7 @@ LIMITS = GridlineWeightLimits()
 def short_edges(
     xy: NDArray[np.float64], edges: NDArray[np.int32], rarity: int, other_rarity: int
 ) -> tuple[float, float]:
-    """Two lengths, px, that all edges exceed but for one in ``rarity``, and but for one in ``other_rarity``.
+    """Two lengths, px, that all edges exceed except for one in ``rarity``, and except for one in ``other_rarity``.
 
     Args:
         xy: (M, 2) px, NaN where unknown.

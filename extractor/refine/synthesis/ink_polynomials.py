@@ -12,7 +12,7 @@ class PolynomialLimits(NamedTuple):
         outlier_tolerance: deviations of the scatter, beyond which a cell is an outlier.
         min_outlier_misfit: gray levels^2, added to that tolerance.
         max_fit_rounds: rounds of weighting.
-        falling_variance: rounds end when the scatter falls to no less than this share.
+        falling_variance: rounds end when the scatter does not fall below this share.
         saturation_per_px: 1/px; a cell of n pixels weighs n / (1 + saturation_per_px n) before the first round.
         weight_reach: in units of the scatter, the misfit where a cell's weight is a quarter.
         expected_factor: of the variance expected from noise, the part that is no scatter of the cells.
