@@ -1,15 +1,15 @@
-"""What each rule of the reader is worth: every rule switched off in a copy of the reader, over the same pictures.
+"""The effect of each rule of the reader: every rule switched off in a copy of the reader, over the same pictures.
 
     python -m benchmarks.ablation [--rule NAME ...] [--preset NAME] [--pictures N] [--seed S] [--json FILE]
 
 A rule for accuracy is tried on the suites plain, stress, damage, scatter and camera together; a rule whose purpose is
 that no wrong id is reported, on pictures made to provoke wrong ids. A rule stays if it saves a wrong id, or if without
 it wrong markers, lost markers or the RMS of measured markers rise by 2 % or more, with a paired 95 % interval above
-zero (bootstrap over pictures). Without a seed, that of the commit's hash is taken.
+zero (bootstrap over pictures). The default seed comes from the commit's hash.
 
 Wrong ids are at another marker's place, or in a picture without the pattern; wrong positions are more than half of the
 shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both
-are judged. Differences are "without the rule" minus "with it". z is of all reported markers, time the ratio of
+are tested. Differences are "without the rule" minus "with the rule". z is of all reported markers, time the ratio of
 processor times. Rules in C++ need a compiler: every process builds a copy of the reader once, and for each such rule
 compiles the changed file.
 """
@@ -57,9 +57,9 @@ def scores_by_suite(
 def try_rules(
     rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, processes: int
 ) -> Iterable[Comparison]:
-    """The comparison of each rule on the pictures of its kind, as soon as it is known, in the order of the rules.
+    """The comparison of each rule on the pictures of its kind, as soon as it is computed, in the order of the rules.
 
-    Each process has a copy of the reader for itself. If a rule is native, all copies are built from their sources.
+    Each process has its own copy of the reader. If a rule is native, all copies are built from their sources.
     """
     full: dict[str, list[PictureScore]] = {}
     idle: SimpleQueue[CodeCopy] = SimpleQueue()

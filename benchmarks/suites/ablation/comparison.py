@@ -1,4 +1,6 @@
-"""A rule's worth: paired differences between the reader without the rule and the full one, over the same pictures."""
+"""A rule's effect: paired differences between the reader without the rule and the full reader, over the same
+pictures.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.trial import PictureScore
 
-LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that stays
+LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that is kept
 RESAMPLES, SEED = 2000, 20250101
 INTERVAL_PERCENT = (2.5, 97.5)
 Verdict = Literal["keep", "goes"]
@@ -43,18 +45,19 @@ class Change(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What a rule is worth.
+    """The effect of a rule.
 
     Attributes:
         rule: the rule that was switched off.
-        pictures: how many were read; ``touched`` of them came out differently.
+        pictures: number of pictures; ``touched`` is the number with a different result.
         wrong_ids, wrong_positions: summed.
-        ids_saved: wrong ids that only the reader without the rule reports; ``ids_cost``: that only the full one does.
-        wrong, lost: the counts that are judged.
-        rms_px: of all measured markers together, which gross errors and poor pictures rule.
-        typical_px: the geometric mean of the pictures' RMS, in which every picture counts the same.
-        z: sqrt(mean d2 / 2) of all reported markers that are not wrong, with and without; not judged.
-        time_ratio: median over pictures of the processor time without the rule over that with it.
+        ids_saved: wrong ids that only the reader without the rule reports; ``ids_cost``: that only the full reader
+            reports.
+        wrong, lost: the counts that are tested.
+        rms_px: of all measured markers together; mainly determined by gross errors and poor pictures.
+        typical_px: the geometric mean of the pictures' RMS, in which every picture has the same weight.
+        z: sqrt(mean d2 / 2) of all reported markers that are not wrong, with and without the rule; not tested.
+        time_ratio: median over pictures of the processor time without the rule over that with the rule.
     """
 
     rule: Rule
@@ -73,12 +76,12 @@ class Comparison(NamedTuple):
 
     @property
     def judged(self) -> tuple[Change, ...]:
-        """The figures by which a rule is judged, besides the ids that it saves."""
+        """The figures that decide on a rule, besides the saved ids."""
         return (self.wrong, self.lost, self.rms_px, self.typical_px)
 
     @property
     def verdict(self) -> Verdict:
-        """A rule stays that saves more ids than it costs, or without which wrong, lost or RMS are worse."""
+        """A rule is kept if it saves more ids than it costs, or if wrong, lost or RMS are worse without the rule."""
         saves_ids = self.ids_saved > self.ids_cost
         return "keep" if saves_ids or any(change.is_worse for change in self.judged) else "goes"
 
@@ -140,7 +143,7 @@ def _log_of_rms(score: PictureScore) -> tuple[float, float]:
 
 
 def _exponential(sums: Floats) -> Floats:
-    """The exponential of the mean: the first sums (N, 2) over the second ones."""
+    """The exponential of the mean: the first sums (N, 2) over the second sums."""
     return np.asarray(np.exp(sums[:, 0] / sums[:, 1]))
 
 
@@ -149,7 +152,7 @@ def _total(sums: Floats) -> Floats:
 
 
 def _root(sums: Floats) -> Floats:
-    """The root of the first sums (N, 2) over the second ones; NaN where nothing was measured."""
+    """The root of the first sums (N, 2) over the second sums; NaN without measured markers."""
     out = np.full(len(sums), np.nan)
     np.divide(sums[:, 0], sums[:, 1], out=out, where=sums[:, 1] > 0)
     return np.asarray(np.sqrt(out))

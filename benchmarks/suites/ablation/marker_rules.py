@@ -31,7 +31,7 @@ PLACES = (
     ),
     Rule(
         "damaged cells",
-        "where most cells have triangles, the edges of one without are not drawn",
+        "where most cells have triangles, the edges of a cell without a triangle are not drawn",
         "accuracy",
         "extractor/numbering/marker_places.py",
         "min_sharp_share: float = 0.6",
@@ -66,7 +66,7 @@ REFINEMENT = (
     ),
     Rule(
         "small move",
-        "no step follows one that hardly moved the markers",
+        "no step follows a step that hardly moved the markers",
         "accuracy",
         "extractor/refine/synthesis_steps.py",
         "typical_move(shift, estimate.information) < schedule.small_move",
@@ -82,7 +82,7 @@ REFINEMENT = (
     ),
     Rule(
         "scatter",
-        "where markers lie by themselves off the smooth map, gridlines do not curve as its tangents say",
+        "where markers deviate independently from the smooth map, gridlines do not follow its tangents",
         "accuracy",
         "extractor/refine/measure/marker_scatter.py",
         "return MarkerScatter(*found)",
@@ -90,7 +90,7 @@ REFINEMENT = (
     ),
     Rule(
         "scatter of profiles",
-        "what profiles leave is not taken for scatter",
+        "the remaining error of profiles is not taken for scatter",
         "accuracy",
         "extractor/refine/measure/marker_scatter.py",
         "start_allowance: float = 100.0",
@@ -125,7 +125,7 @@ COMPLETE = (
     ),
     Rule(
         "agreed unexplained",
-        "the tolerance is slightly narrower where triangles agree and synthesis explains nothing",
+        "the tolerance is slightly narrower where triangles agree and synthesis does not explain the image",
         "accuracy",
         "extractor/native/complete/consistency_filter.cpp",
         "allowed = limits.max_agreed_unexplained_distance;",
@@ -149,7 +149,7 @@ COMPLETE = (
     ),
     Rule(
         "repair by uncertain",
-        "lost markers are predicted from uncertain ones, too",
+        "lost markers are predicted from uncertain markers, too",
         "accuracy",
         "extractor/native/complete/repair.cpp",
         "if (is_any(lost_) && is_any(Flags(markers_.uncertain))) {",
@@ -181,7 +181,7 @@ COMPLETE = (
     ),
     Rule(
         "fusion",
-        "an uncertain marker is fused with the prediction by its rings",
+        "an uncertain marker is combined with the prediction by its rings",
         "accuracy",
         "extractor/native/complete/repair.cpp",
         "else if (variance >= 0.0) {",
