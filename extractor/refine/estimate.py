@@ -153,7 +153,7 @@ class EdgeContrasts(NamedTuple):
     """The change of color across the gridlines; it stays the same where gridlines move by a pixel.
 
     Attributes:
-        sides: (E, 6) light on both sides, as ``gridline_sides`` gives it.
+        sides: (E, 6) light on both sides, as ``GridlineSides`` gives it.
         contrasts: (E, 3) gray levels, differences of the values on both sides.
         clearance: (E, 4), as ``gridline_clearance`` gives it.
     """

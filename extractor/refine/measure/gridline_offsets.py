@@ -38,7 +38,7 @@ class GridlineReading(NamedTuple):
 
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
-        sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
+        sides: (E, 6), the light on both sides, as ``GridlineSides`` gives it.
         added: (E, 6), the light to add to the drawing on both sides; the sides themselves where nothing was drawn.
         clearance: (E, 4), as ``gridline_clearance`` gives it; used where nothing was drawn.
         weight: (E,) 0 to 1.
