@@ -38,7 +38,7 @@ class GridlineReading(NamedTuple):
 
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
-        sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
+        sides: (E, 6), the light on both sides, as ``GridlineSides`` gives it.
         added: (E, 6), the light to add to the drawing on both sides; the sides themselves where no pattern was drawn.
         clearance: (E, 4), from ``gridline_clearance``; used where no pattern was drawn.
         weight: (E,) 0 to 1.
