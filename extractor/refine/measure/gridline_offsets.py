@@ -18,10 +18,11 @@ class OffsetLimits(NamedTuple):
     """Limits of the offsets.
 
     Attributes:
-        clear_sigma: in units of the blur, the smallest distance of the next gridline where no pattern was drawn.
-        min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast.
-        min_offset_weight: of a gridline, for its offsets to be measured.
-        band: in units of the blur, the distance from a gridline within which pixels count.
+        clear_sigma: in units of the blur, the least distance of the next gridline where nothing was drawn. Chosen.
+        min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast. Chosen.
+        min_offset_weight: of a gridline, for its offsets to be measured. Chosen.
+        band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
+            ``PixelRowLimits``.
     """
 
     clear_sigma: float = 2.0
