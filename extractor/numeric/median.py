@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-"""The median of a few numbers, by the compiled loops."""
-=======
-"""The median of a few numbers, and a place of the sorted numbers, as the compiled loops take them."""
->>>>>>> draw
+"""The median of a few numbers, and the number at a place of the sorted numbers, by the compiled loops."""
 
 from __future__ import annotations
 
