@@ -1,4 +1,4 @@
-"""What each rule of the reader is worth: every rule switched off in a copy of the reader, over the same pictures.
+"""The effect of each rule of the reader: every rule switched off in a copy of the reader, over the same pictures.
 
     python -m benchmarks.ablation [--rule NAME ...] [--together] [--preset NAME] [--pictures N] [--seed S]
 
@@ -64,9 +64,9 @@ def scores_by_suite(
 def try_rules(
     rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, processes: int
 ) -> Iterable[Comparison]:
-    """The comparison of each rule on the pictures of its kind, as soon as it is known, in the order of the rules.
+    """The comparison of each rule on the pictures of its kind, as soon as it is computed, in the order of the rules.
 
-    Each process has a copy of the reader for itself. If a rule is native, all copies are built from their sources.
+    Each process has its own copy of the reader. If a rule is native, all copies are built from their sources.
     """
     full: dict[str, list[PictureScore]] = {}
     idle: SimpleQueue[CodeCopy] = SimpleQueue()

@@ -44,7 +44,7 @@ LIMITS = CellLimits()
 
 
 class CellArrays(NamedTuple):
-    """The image's colored cells as native loops take them.
+    """The image's colored cells for native loops.
 
     Attributes:
         center_px, ink, area_px, corner_px: as in ``Cells``.
@@ -91,7 +91,7 @@ class Cells:
 
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
-    """The domains that are large enough for cells, at full scale; in a cluttered image only the triangles.
+    """The domains that are large enough for cells, at full scale; in a cluttered image triangles only.
 
     Args:
         seeds: the domains, at 1/``scale`` of the image's scale.

@@ -57,7 +57,7 @@ class Seeds:
         area_px: (N,) int64, the domain's area, px^2.
         runs: (R, 4) int32, the domains' horizontal runs: y, first x, last x, ink.
         domain: (R,) int32, the domain of each run.
-        cluttered: there were more domains than any pattern explains; only those that may be cells are kept.
+        cluttered: there were more domains than in any pattern; only domains that may be cells are kept.
     """
 
     area_px: NDArray[np.int64]
@@ -93,8 +93,8 @@ def find_seeds(segmentation: Segmentation, max_domains: int = NO_DOMAIN_LIMIT) -
 
     Args:
         segmentation: the ink of every pixel.
-        max_domains: of more domains than this, small and ragged ones are ignored, too: an image of noise has many times
-            more domains than any pattern.
+        max_domains: above this number of domains, small and ragged domains are ignored, too: an image of noise has many
+            times more domains than any pattern.
     """
     runs, parent = native.find_runs(segmentation.label)
     runs, domain, area_px, cluttered = native.find_domains(runs, parent, max_domains, LIMITS)

@@ -69,7 +69,7 @@ def update_triangle_corners(
 ) -> None:
     """Move the corners of triangles to the intersections of their measured edges.
 
-    The first profiles reach across the cell; for large cells shorter ones follow.
+    The first profiles reach across the cell; for large cells shorter profiles follow.
 
     Args:
         view: the image.

@@ -1,6 +1,6 @@
 """Stage 8, first half: markers that contradict their neighbours are dropped.
 
-A marker must lie where the map of its two rings puts it.
+A marker must lie at the place that follows from the map of its two rings.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class ConsistentMarkers(NamedTuple):
 
 
 class MarkerEvidence(NamedTuple):
-    """Results of earlier stages by which markers are judged, for each of M markers.
+    """Results of earlier stages for the tests of markers, for each of M markers.
 
     Attributes:
         explained: (M,) bool, synthesis explains the image around the marker.

@@ -1,4 +1,4 @@
-"""The quality of an image, measured at the middles of cells: what limits the reading of its markers."""
+"""The quality of an image, measured at the middles of cells: the properties that limit the reading."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def measure_quality(
 
 
 def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None) -> Quality:
-    """The quality of an image in which no cell was numbered; ``cells`` are those that were found, if any."""
+    """The quality of an image in which no cell was numbered; ``cells`` are the found cells, if any."""
     clipping = float(
         (view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE].max(axis=2) >= LIMITS.clipped_value).mean()
     )

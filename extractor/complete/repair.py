@@ -1,10 +1,12 @@
-"""Stage 8: markers that contradict their neighbours are dropped, and lost ones repaired where that is safe.
+"""Stage 8: markers that contradict their neighbours are dropped, and lost markers are repaired where their neighbours
+leave no doubt.
 
-Mild omission (the article's eq. 6): the triangles around a lost marker imply its place; here all markers of two rings
-do, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
-sextant, read at equidistant places. A marker that neither predicts within a tenth of an edge stays lost.
+Mild omission (the article's eq. 6): the triangles around a lost marker give its place; here all markers of two rings
+give it, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
+sextant, read at equidistant places. A marker that neither method predicts within a tenth of an edge stays lost.
 
-An uncertain marker, as under dirt, may be predicted by its rings better than it is measured: both are fused.
+The prediction by the rings of an uncertain marker, as under dirt, may be better than its measurement: both are
+    combined.
 """
 
 from __future__ import annotations
@@ -85,7 +87,7 @@ LIMITS = RepairLimits()
 
 
 class UnrepairedMarkers(NamedTuple):
-    """What is known of M markers before repair.
+    """M markers before repair.
 
     Attributes:
         xy_px, cov_px2: (M, 2) and (M, 2, 2) float64, NaN where lost; they are written.
@@ -118,7 +120,8 @@ class RepairedMarkers:
 def repair_markers(
     refined: RefinedMarkers, places: InitialMarkers, lattice: Lattice, size: tuple[int, int]
 ) -> RepairedMarkers:
-    """Drop inconsistent markers, repair lost ones that the others predict, and fuse uncertain ones with predictions.
+    """Drop inconsistent markers, repair lost markers that the others predict, and combine uncertain markers with
+    predictions.
 
     Args:
         refined: the markers after refinement.

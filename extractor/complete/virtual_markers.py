@@ -77,7 +77,7 @@ def locate_virtual_markers(
 
     Args:
         points: (E, m, 3) float64, measured x and y (px) and their variance across the gridline (px^2), NaN for none.
-        scatter: of the markers; with some, the gridlines curve as the map's second derivatives say.
+        scatter: of the markers; with scatter, the gridlines curve by the map's second derivatives.
     """
     if points.shape[1] == 0:
         return VirtualMarkers(

@@ -39,9 +39,9 @@ def completed_linear_maps(
 ) -> NDArray[np.float64]:
     """The linear map around each numbered cell, by least squares over its six neighbours.
 
-    The millimetres of the layout contain the pattern's own shape, so a round pattern is no more curved than a
+    The millimetres of the layout contain the pattern's own shape, so a round pattern has the same maps as a
     honeycomb. Where a cell has too few neighbours, at the rims of holes, its own triangle gives its map if a neighbour
-    shows which of its corners is which.
+    determines the order of its corners.
 
     Args:
         center_px: (N, 2) the cells' centers; corner_px: (N, 3, 2) their triangles, clockwise, or NaN.

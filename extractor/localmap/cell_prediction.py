@@ -1,7 +1,7 @@
 """Predicts the image places of the down-cells around numbered cells.
 
-The three cells next to a place predict it best. Cells farther away are used only for places that the nearer cells leave
-open and that are possible origins of the pattern.
+The three cells next to a place predict the place best. Cells farther away are used only for places that the nearer
+cells leave open and that are possible origins of the pattern.
 """
 
 from __future__ import annotations

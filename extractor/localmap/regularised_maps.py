@@ -1,6 +1,7 @@
 """Quadratic maps through the markers of two rings, with regularised curvature, for many markers at once.
 
-They serve markers whose rings are incomplete: at the pattern's rim and around damage. An unknown neighbour has no
+They are used for markers whose rings are incomplete: at the pattern's rim and around damage. An unknown neighbour has
+    no
 weight.
 """
 

@@ -136,6 +136,6 @@ def corner_agreement(
 
     Args:
         agreeing: (M,) how many triangles agree at each marker.
-        meeting: (M,) how many the pattern has there.
+        meeting: (M,) how many triangles the pattern has there.
     """
     return (agreeing == meeting) | (agreeing >= 2), (agreeing == meeting) & (agreeing >= 2)

@@ -44,7 +44,7 @@ LIMITS = OutlineLimits()
 def align_to_outline(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32] | None:
     """Align connected cells with the layout's outline.
 
-    All rotations by 120 degrees and all shifts that carry every ink onto itself are tried.
+    All rotations by 120 degrees and all shifts that map every ink onto itself are tried.
 
     Args:
         axial: (N, 2) int32, axial coordinates of the connected cells, up to such a rotation and shift;

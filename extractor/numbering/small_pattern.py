@@ -1,8 +1,8 @@
 """Recognises a small pattern in a large image: numbered at a reduced scale by the centers of its cells alone.
 
-Cells of a few pixels have no shape at that scale, but their centers are accurate to a fraction of a pixel. If these
-number the whole pattern, the numbers predict every cell's corners, and the edges are then measured in the full image.
-So no region is grown and no triangle is fitted in the background.
+Cells of a few pixels have no shape at that scale, but their centers are accurate to a fraction of a pixel. If the
+centers number the whole pattern, the numbers predict every cell's corners, and the edges are then measured in the full
+image. So no region is grown and no triangle is fitted in the background.
 """
 
 from __future__ import annotations

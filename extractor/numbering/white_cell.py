@@ -94,7 +94,7 @@ LIMITS = WhiteCellLimits()
 
 
 class WhiteCellLayout(NamedTuple):
-    """The layout as needed for the search of the white cell.
+    """The layout for the search of the white cell.
 
     Attributes:
         layers: number of layers.

@@ -1,8 +1,8 @@
 """Searches the white cell, which fixes the rotation and the origin of a numbering.
 
-The white cell is a down-cell; all other down-cells are black. So it is searched where down-cells are predicted: first
-in the middle between three numbered cells, and farther away only if it is not found there. The white cell fills its
-triangle and ends with it, which hardly any dirt or reflection on a black cell does.
+The white cell is a down-cell; all other down-cells are black. Therefore it is searched at the predicted down-cells:
+first in the middle between three numbered cells, and farther away only if it is not found there. The white cell fills
+its triangle and ends at its sides; dirt or a reflection on a black cell hardly ever does.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class _WhiteCandidates(NamedTuple):
     """P bright places, the brightest first.
 
     Attributes:
-        ring: the ring around the known cells in which they were found, -1 if none was.
+        ring: the ring around the known cells in which they were found, -1 if none was found.
         cell: (P, N) int32, the layout's cell of each cell of the image, or -1.
         inside: (P,) int64, how many known cells lie in the layout; 0 where the white cell is not there.
         missing: (P,) int64, see ``LayoutPlacement``.
@@ -101,9 +101,9 @@ class _WhiteCandidates(NamedTuple):
 def placements_by_white_cell(
     image: NDArray[np.uint8], cells: Cells, lattice: Lattice, axial: NDArray[np.int32]
 ) -> list[LayoutPlacement]:
-    """All placements with the white cell at a bright place; one of them leaves hardly any cell outside the layout.
+    """All placements with the white cell at a bright place; one placement has hardly any cell outside the layout.
 
-    The others are white cells, too, but the walked cells are not this layout around them.
+    The other places are white cells, too, but the walked cells around them are not this layout.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.

@@ -102,7 +102,7 @@ def add_dirt_variance(
 
     Args:
         cov: (M, 2, 2) px^2, written.
-        weight: (E,) 0 to 1, of the gridlines; 0 where nothing was measured.
+        weight: (E,) 0 to 1, of the gridlines; 0 for gridlines that were not measured.
         spokes: (M, 6) the gridlines at each marker.
         edge: (M,) px, the length of the edges at each marker.
     """
@@ -149,7 +149,7 @@ def update_lost_markers(
     Args:
         xy, cov: (M, 2) px and (M, 2, 2) px^2; unaccepted markers far from where they are predicted become NaN.
         unaccepted: (M,) bool.
-        predicted: (M, 2) px, where the neighbours put the markers.
+        predicted: (M, 2) px, the markers by their neighbours.
         start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
 
     Returns:

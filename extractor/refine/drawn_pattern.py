@@ -56,7 +56,7 @@ class Synthesis(NamedTuple):
 
     Attributes:
         xy, lines, bend: the markers (M, 2) px, the gridlines (E, 8) and their bending (E, 2) px.
-        sides, contrasts: (E, 6) and (E, 3), as ``gridline_sides`` and ``value_contrasts`` give them.
+        sides, contrasts: (E, 6) and (E, 3), as ``GridlineSides`` and ``value_contrasts`` give them.
         added: (E, 6), the light to add on both sides: the black, and the difference of the corrected levels.
         sums: (E, 24), as ``accumulate_residual_sums`` gives them.
         corrected_levels: of the inks, corrected by the residual in the middles of the cells.

@@ -1,4 +1,4 @@
-"""The appearance of an image before anything is measured: noise, levels of the inks, contrasts, and blur."""
+"""The appearance of an image before the first measurement: noise, levels of the inks, contrasts, and blur."""
 
 from __future__ import annotations
 
@@ -61,7 +61,9 @@ def initial_appearance(view: PyramidLevel, topology: Topology, xy: NDArray[np.fl
 def update_edge_contrasts(
     view: PyramidLevel, topology: Topology, estimate: Estimate, lines: NDArray[np.float64]
 ) -> EdgeContrasts:
-    """The contrasts across the gridlines (E, 8). Those beside unknown cells are marked as not known in ``lines``."""
+    """The contrasts across the gridlines (E, 8). Gridlines beside unknown cells are marked as not known in
+    ``lines``.
+    """
     where = lines, estimate.xy, topology
     return EdgeContrasts(*native.edge_contrasts(*where, estimate.levels, view, LIMITS))
 

@@ -1,8 +1,10 @@
-"""Markers that contradict their neighbours: dirt that looks like a gridline has moved them.
+"""Markers that contradict their neighbours, because of dirt that looks like a gridline.
 
-Two independent signs must agree: the gridlines of the marker do not look like the pattern, and most gridlines through
-it show that the map would be smooth if the marker were moved by one vector. The marker then starts again from there.
-Sharp bends, at the rim of an object or where it slips, ask for vectors that differ from one gridline to the next.
+Two independent criteria must agree: the gridlines of the marker do not look like the pattern, and most gridlines
+    through
+the marker show that the map would be smooth if the marker were moved by one vector. The marker then starts again from
+the moved place. Sharp bends, at the rim of an object or where it slips, give vectors that differ from one gridline to
+the next.
 """
 
 from __future__ import annotations
@@ -71,7 +73,7 @@ def correct_outliers(
         view: the image.
         topology: of the layout.
         estimate: after the first round of profiles.
-        profile_weight: (E,) 0 to 1, how well gridlines look like the pattern.
+        profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         places: of the full image.
     """
     assert estimate.reading is not None
@@ -101,7 +103,7 @@ def find_outliers(
         topology: of the layout.
         estimate: after a round of profiles.
         xy: (M, 2) px, NaN where unknown.
-        profile_weight: (E,) 0 to 1, how well gridlines look like the pattern.
+        profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         edge_px: (M,) the length of the edges at each marker.
 
     Returns:

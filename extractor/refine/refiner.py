@@ -1,8 +1,8 @@
 """Stage 9: all markers are solved together, from profiles across the gridlines and then by synthesis.
 
-Profiles reduce the error from a pixel to some hundredths of one. From there a step by synthesis is a Gauss-Newton step
-on the likelihood of the whole image, with the curvature that includes the overlap of the gridlines at the corners. One
-such step is nearly enough.
+Profiles reduce the error from a pixel to some hundredths of a pixel. From there a step by synthesis is a Gauss-Newton
+step on the likelihood of the whole image, with the curvature that includes the overlap of the gridlines at the corners.
+One such step is nearly enough.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ class Refiner:
 
         Args:
             pyramid: the image.
-            places: where the markers were found, to about a pixel.
-            before: the appearance of the image before, in a sequence.
+            places: the markers' places, to about a pixel.
+            before: the appearance of the previous image of a sequence.
         """
         short_edge, usual_edge = short_edges(
             places.xy_px, self._topology.edges, SHORTEST_RARITY, SHORT_RARITY
@@ -140,7 +140,7 @@ class Refiner:
             view: the image.
             places: of the full image.
             start: (M, 2) px in the full image, where the profiles are.
-            before: the appearance of the image before, in a sequence.
+            before: the appearance of the previous image of a sequence.
 
         Returns:
             The estimate, the contrasts across the gridlines, and the places without outliers.
@@ -184,7 +184,7 @@ class Refiner:
         places: InitialMarkers,
         edge_px: float,
     ) -> RefinedMarkers:
-        """The last round of profiles, or synthesis where the blur asks for it.
+        """The last round of profiles, or synthesis where the blur requires it.
 
         Args:
             view: the image.
@@ -222,7 +222,9 @@ class Refiner:
     def _accept_or_recover(
         self, view: PyramidLevel, estimate: Estimate, contrasts: EdgeContrasts, places: InitialMarkers
     ) -> RefinedMarkers:
-        """The accepted markers; where the drawing does not explain the image, as in glare, those by many profiles."""
+        """The accepted markers; where the drawing does not explain the image, as in glare, the markers by many
+        profiles.
+        """
         xy, cov = self._accepted_markers(estimate, places)
         unexplained = estimate.noise > UNEXPLAINED_NOISE_RATIO * estimate.pixel_noise
         start = places.xy_px, places.edge_px

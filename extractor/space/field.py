@@ -43,12 +43,14 @@ class Field:
         if corners.shape[1] == 4:
             corners = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
         self.triangles: NDArray[np.int32] = corners
-        self._last_stencil: tuple[bytes, Array] | None = None  # of the markers known last, with this key
+        self._last_stencil: tuple[bytes, Array] | None = (
+            None  # weights of the last known markers, with this key
+        )
         self._ring_markers = _two_rings(np.asarray(layout.edges), len(self.xy_mm))
         self._edge_mm = float(np.linalg.norm(np.diff(self.xy_mm[layout.edges], axis=1)[:, 0], axis=1).mean())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is built anew from the layout."""
+        """A copy is made from the layout."""
         return type(self), (self._layout,)
 
     @cached_property

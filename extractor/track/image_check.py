@@ -69,12 +69,12 @@ def check_cells(
     tables: WarmTables,
     levels_before: NDArray[np.float64] | None,
 ) -> CellCheck:
-    """Compare predicted cells with the image, and their inks with those in the frame before.
+    """Compare predicted cells with the image, and their inks with those in the previous frame.
 
     Args:
         image: (H, W, 3) uint8 BGR.
         corner_px: (C, 3, 2) predicted corners, NaN where not predicted.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before; None: inks are not compared.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame; None: inks are not compared.
     """
     compare = levels_before is not None
     before = np.zeros((len(tables.ink), 3)) if levels_before is None else levels_before[0]

@@ -63,16 +63,16 @@ def align_to_inks(
     levels_before: NDArray[np.float64],
     shift_before: NDArray[np.float64],
 ) -> AlignedMarkers:
-    """The markers moved to where the inks of their cells are, in at most two passes.
+    """The markers moved to the places of their cells' inks, in at most two passes.
 
-    Blur, encoding and the choice of pixels shift centroids by a tenth of a pixel, alike in frames that are alike. So
-    the shift of a cell that rests is the difference from what the frame before showed at its own markers.
+    Blur, encoding and the choice of pixels shift centroids by a tenth of a pixel, equally in equal frames. Therefore
+    the shift of a cell that rests is the difference from the shift in the previous frame at its own markers.
 
     Args:
         image: (H, W, 3) uint8 BGR.
         predicted_px: (M, 2), NaN where not predicted.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
-        shift_before: (C, 2) px, ``resting_shifts`` of the frame before.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame.
+        shift_before: (C, 2) px, ``resting_shifts`` of the previous frame.
     """
     for _ in range(2):
         shift = _measure_shifts(image, predicted_px, tables, levels_before)

@@ -1,4 +1,6 @@
-"""A rule's worth: paired differences between the reader without the rule and the full one, over the same pictures."""
+"""A rule's effect: paired differences between the reader without the rule and the full reader, over the same
+pictures.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.trial import PictureScore
 
-LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that stays
+LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that is kept
 RESAMPLES, SEED = 2000, 20250101
 INTERVAL_PERCENT = (2.5, 97.5)
 Verdict = Literal["keep", "goes"]
@@ -43,11 +45,11 @@ class Change(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What a rule is worth.
+    """The effect of a rule.
 
     Attributes:
         rule: the rule that was switched off.
-        pictures: how many were read; ``touched`` of them came out differently.
+        pictures: number of pictures; ``touched`` is the number with a different result.
         wrong_ids, wrong_positions: summed.
         ids_saved: wrong ids that only the reader without the rule reports; ``ids_cost``: that only the full one does.
         wrong, lost: the counts that are judged.
@@ -152,7 +154,7 @@ def _log_of_rms(score: PictureScore) -> tuple[float, float]:
 
 
 def _exponential(sums: Floats) -> Floats:
-    """The exponential of the mean: the first sums (N, 2) over the second ones."""
+    """The exponential of the mean: the first sums (N, 2) over the second sums."""
     return np.asarray(np.exp(sums[:, 0] / sums[:, 1]))
 
 

@@ -93,7 +93,7 @@ COMPLETE = (
     ),
     Rule(
         "agreed unexplained",
-        "the tolerance is slightly narrower where triangles agree and synthesis explains nothing",
+        "the tolerance is slightly narrower where triangles agree and synthesis does not explain the image",
         "accuracy",
         "extractor/native/complete/consistency_filter.cpp",
         "allowed = limits.max_agreed_unexplained_distance;",
@@ -117,7 +117,7 @@ COMPLETE = (
     ),
     Rule(
         "repair by uncertain",
-        "lost markers are predicted from uncertain ones, too",
+        "lost markers are predicted from uncertain markers, too",
         "accuracy",
         "extractor/native/complete/repair.cpp",
         "if (is_any(lost_) && is_any(Flags(markers_.uncertain))) {",
@@ -141,7 +141,7 @@ COMPLETE = (
     ),
     Rule(
         "fusion",
-        "an uncertain marker is fused with the prediction by its rings",
+        "an uncertain marker is combined with the prediction by its rings",
         "accuracy",
         "extractor/native/complete/repair.cpp",
         "else if (variance >= 0.0) {",

@@ -1,4 +1,4 @@
-"""The rules of the numbering, and of the cells that stand apart."""
+"""The rules of the numbering, and of detached cells."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ NUMBERING = (
     ),
     Rule(
         "marker turn",
-        "markers are brighter than black cells, which tells the view's side",
+        "markers are brighter than black cells, which determines the view's side",
         "no wrong id",
         "extractor/numbering/mesh_parts.py",
         "return [front] if front != 0 else [1, -1]",
@@ -79,7 +79,7 @@ NUMBERING = (
     ),
     Rule(
         "between inks",
-        "the cells beside the white one show their inks",
+        "the cells beside the white cell show their inks",
         "no wrong id",
         "extractor/native/numbering/white_cell.cpp",
         "return is_white_triangle() && is_between_inks();",
@@ -87,7 +87,7 @@ NUMBERING = (
     ),
     Rule(
         "white centroid",
-        "the white cell is tried at the centroid of the white, too",
+        "the white cell is tried at the centroid of the white area, too",
         "accuracy",
         "extractor/numbering/white_cell.py",
         "max_centroid_distance: float = 0.3",
@@ -106,7 +106,7 @@ NUMBERING = (
 GAPS = (
     Rule(
         "touch",
-        "cells in contact with numbered ones are numbered",
+        "cells in contact with numbered cells are numbered",
         "accuracy",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "update_numbers_by_contact(contacts, triangles, new_cells, numbering)",
@@ -122,7 +122,7 @@ GAPS = (
     ),
     Rule(
         "unique claim",
-        "a cell of the layout that two cells claim is given to neither",
+        "a cell of the layout that two cells may be is assigned to neither",
         "no wrong id",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "assignments.candidate_count[place] != 1",
@@ -130,7 +130,7 @@ GAPS = (
     ),
     Rule(
         "nearest first",
-        "the cells nearest to numbered ones are numbered first",
+        "the cells nearest to numbered cells are numbered first",
         "no wrong id",
         "extractor/numbering/gaps/cell_claims.py",
         "joint_gap: float = 1.7",
@@ -162,7 +162,7 @@ GAPS = (
     ),
     Rule(
         "first check",
-        "cells are checked before detached ones are numbered, too",
+        "cells are also checked before detached cells are numbered",
         "no wrong id",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "out, consistent_cells(contacts, out, white_px, neighbours, limits.check), neighbours);",

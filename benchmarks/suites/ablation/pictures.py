@@ -43,7 +43,7 @@ class KeptPicture(NamedTuple):
     """A picture on disk.
 
     Attributes:
-        suite, kind: of the picture.
+        suite, kind: suite and kind of the picture.
         path: the file that ``read_pictures`` of ``worker`` reads.
         truths: one entry for each pattern in the picture; none without a pattern.
     """
@@ -55,7 +55,9 @@ class KeptPicture(NamedTuple):
 
 
 def sampled_cases(suite: str, count: int, seed: int) -> list[CalibrationCase]:
-    """``count`` pictures of a suite, drawn from all of its pictures by the seed; all if it has fewer."""
+    """``count`` pictures of a suite, drawn from all of its pictures by the seed; all pictures if the suite has
+    fewer.
+    """
     if suite == PROVOKING:
         return list(islice(provoking_cases(seed), count))
     cases = list(suites_by_name()[suite](False, seed))

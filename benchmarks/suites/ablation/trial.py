@@ -29,9 +29,10 @@ class PictureScore(NamedTuple):
 
     Attributes:
         wrong_ids: reported at the place of another marker, or in a picture without a pattern.
-        wrong_positions: reported more than half of the shortest edge from their place, but at no other's.
+        wrong_positions: reported more than half of the shortest edge from their place, but not at another marker's
+            place.
         lost: visible, not reported.
-        visible: visible ones.
+        visible: visible markers.
         measured: measured, not wrong.
         squared_px2: the sum of their squared errors, both axes.
         reported: reported, not wrong.
@@ -105,7 +106,7 @@ def read_changed(
 
 
 def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureScore:
-    """The score of a reading against the pattern in the picture that it is nearest to."""
+    """The score of a reading against the nearest pattern in the picture."""
     reported = reading.status != Status.LOST
     if not truths:
         return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, 0, 0.0, 0, reading.ms)

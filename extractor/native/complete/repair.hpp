@@ -43,7 +43,7 @@ struct RepairLimits {
   }
 };
 
-// What is known of M markers before repair.
+// M markers before repair.
 struct UnrepairedMarkers {
   View<double, 2> xy_px;             // (M, 2) NaN where lost; written
   View<double, 3> cov_px2;           // (M, 2, 2) NaN where lost; written

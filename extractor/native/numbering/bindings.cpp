@@ -1,4 +1,4 @@
-// Room "numbering" as Python sees it.
+// Room "numbering" for Python.
 #include "base/binding.hpp"
 
 #include "numbering/lattice_walk.hpp"

@@ -1,4 +1,4 @@
-"""Assigns cells without a number to free cells of the layout, those nearest to the numbered ones first."""
+"""Assigns cells without a number to free cells of the layout, beginning with the cells nearest to numbered cells."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Cells in contact: neighbours in the pattern share a corner; a triangle's ink and corner determine its number.
 
 The only extrapolation is by one cell's own triangle to its neighbour, and back. Cells connected by corners are numbered
-alike, wherever damage has cut the mesh (the article's eqs. 4 and 5).
+in the same way, also where damage has cut the mesh (the article's eqs. 4 and 5).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Edge profiles: the colors across each gridline as a profile from 1 to 0, and the blur of that profile.
 
-Profiles are read between the corners of a gridline only (``matched_filter``). They are fast, and safe from a start
+Profiles are read between the corners of a gridline only (``matched_filter``). They are fast, and converge from a start
 that is a pixel off.
 """
 

@@ -7,7 +7,8 @@ gridlines, which are 0 where the map is quadratic. A gridline then deviates from
     t (1 - t) (b + s (1 - 2 t)),
 
 t along the chord, b and s of zero mean and a deviation that is a share of these differences. The share, from
-``min_bend_share`` to ``max_bend_share``, follows from the gridlines around: how much more they are bent than noise
+``min_bend_share`` to ``max_bend_share``, follows from the surrounding gridlines: their bending above the part that
+    noise
 explains. Both unknowns are eliminated from a gridline's sums before the markers are solved, and computed afterwards.
 """
 
@@ -75,7 +76,7 @@ class MarkerRows(NamedTuple):
 
     Attributes:
         edges: (E, 2) marker ids of the two in the middle.
-        next_markers: (E, 2) marker ids of the one before and the one after, -1 for none.
+        next_markers: (E, 2) marker ids of the marker before and the marker after, -1 for none.
         third_differences: (E, 2) the layout's own third difference of the four, in units of its mean edge.
     """
 
@@ -95,8 +96,8 @@ def measure_roughness(
     """The roughness of the markers.
 
     The roughness is the median of the squared third differences along the gridlines at a marker and at its neighbours,
-    less the part that noise and the layout itself explain. By the median, one marker that dirt has moved does not free
-    its gridlines to follow.
+    less the part that noise and the layout itself explain. With the median, one marker that dirt has moved does not let
+    its gridlines bend.
 
     Args:
         xy: (M, 2) px, the markers, NaN where unknown.

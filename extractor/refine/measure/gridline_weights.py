@@ -60,7 +60,7 @@ LIMITS = GridlineWeightLimits()
 def short_edges(
     xy: NDArray[np.float64], edges: NDArray[np.int32], rarity: int, other_rarity: int
 ) -> tuple[float, float]:
-    """Two lengths, px, that all edges exceed but for one in ``rarity``, and but for one in ``other_rarity``.
+    """Two lengths, px, that all edges exceed except for one in ``rarity``, and except for one in ``other_rarity``.
 
     Args:
         xy: (M, 2) px, NaN where unknown.

@@ -1,9 +1,9 @@
 """The disagreement of the gridlines that meet at markers, and the variance that it shows.
 
 A marker has two unknowns and up to six gridlines. Where noise alone moves gridlines, the squared distances between each
-gridline's own place and the place that the solved markers give it add up to the degrees of freedom. Halos, clipping,
-ink edges that lie beside each other, dirt and compression make them larger. The ratio, of the picture and of the
-gridlines around each, multiplies the variance of the noise (the Birge ratio; Birge, Phys. Rev. 40, 207, 1932).
+gridline's own place and its place by the solved markers add up to the degrees of freedom. Halos, clipping,
+displaced ink edges, dirt and compression increase these distances. The ratio, of the picture and of the
+gridlines around each marker, multiplies the variance of the noise (the Birge ratio; Birge, Phys. Rev. 40, 207, 1932).
 """
 
 from __future__ import annotations

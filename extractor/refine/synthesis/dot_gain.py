@@ -1,7 +1,7 @@
-"""Dot gain: all cells look larger than they are, by the same width, as inks run out or the camera is not linear.
+"""Dot gain: all cells look larger by the same width, because inks bleed or the camera is not linear.
 
-Every gridline then lies off towards the black beside the gridline. Around a marker where colored and black cells
-alternate this cancels. At the pattern's rim it does not: an acute corner there moves outward by several widths.
+Every gridline is then shifted towards the black beside the gridline. Around a marker where colored and black cells
+alternate, these shifts cancel. At the pattern's rim they do not: an acute corner there moves outward by several widths.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The ink levels of one image: a level for every cell, from the cell itself and from all cells of its ink.
 
 A cell's own level is noisy, and half of the error would go into its gridlines. Light and print vary smoothly from cell
-to cell as a rule, and a low polynomial over the image, fitted robustly to each ink, is far less noisy. Every level is
-drawn towards the polynomial in the proportion of noise in the cells' scatter about the polynomial. Where the scatter is
-not noise (uneven print, hard shadows, a missing cell) the cell's own level stays.
+to cell in most images, and a low polynomial over the image, fitted robustly to each ink, has much less noise. Every
+level is moved towards the polynomial by the share of noise in the cells' scatter about the polynomial. Where the
+scatter is not noise (uneven print, hard shadows, a missing cell) the cell's own level is kept.
 """
 
 from __future__ import annotations
