@@ -137,7 +137,7 @@ def test_the_rows_are_what_the_extractor_finds(sources: Path, tmp_path: Path) ->
 
 def test_a_source_is_given_once(sources: Path, tmp_path: Path) -> None:
     words = (sources / "layout.json", sources / "press.mkv", sources / "press.mkv")
-    assert "press.mkv: is given twice" in refused("extract", *words, "-o", tmp_path / "out")
+    assert "press.mkv is given twice" in refused("extract", *words, "-o", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -256,7 +256,7 @@ def test_a_changed_plan_is_noticed(made: Path, tmp_path: Path) -> None:
     assert "holds a data set of another plan" in refused("dataset", other, "-o", folder)
     plan = folder / "plan.json"
     plan.write_text(plan.read_text(encoding="utf-8").replace('"seed": 0', '"seed": 1'), encoding="utf-8")
-    assert "plan.json: was changed" in refused("dataset", write_plan(tmp_path), "-o", folder)
+    assert "plan.json was changed" in refused("dataset", write_plan(tmp_path), "-o", folder)
 
 
 def test_damage_is_told_with_what_helps(made: Path, tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_damage_is_told_with_what_helps(made: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"000001.parquet: cannot be read \(.*make the shard again"):
         load(folder)[2]
     (folder / "images" / "000000.tar").write_bytes(b"no tar" * 200)
-    with pytest.raises(InputError, match=r"000000.tar: is no tar file"):
+    with pytest.raises(InputError, match=r"000000.tar is no tar file"):
         load(folder)[0]
     for text in ("{}", "[1]", "no JSON", '{"plan": "other", "shards": [{"shard": "../../x"}]}'):
         (folder / "manifest.json").write_text(text, encoding="utf-8")

@@ -157,7 +157,7 @@ def test_a_stream_is_read_by_its_address(made: Path, tmp_path: Path) -> None:
 
 def test_an_address_is_said_as_it_was_given(made: Path, tmp_path: Path) -> None:
     address = "rtsp://127.0.0.1:9/live"
-    assert f"stream {address} cannot be opened; is the address right" in refused(
+    assert f"stream {address} cannot be opened; check the address" in refused(
         "track", made / "layout.json", address, "-o", tmp_path / "a.npz"
     )
 
