@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
 from cmpdesign.cli import app
+from cmpdesign.errors import DesignError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.laser.as_made_svg import as_made_svg
@@ -151,6 +152,25 @@ def test_every_shipped_setting_makes_a_job(material: str) -> None:
             job = made_job(laser__machine=machine, laser__material=material, laser__mode=mode)
             assert min(job.back.x_mm, job.back.y_mm) > 0
             assert all(one.cavities.exists.all() for one in job.cell_passes)  # type: ignore[union-attr]
+
+
+def test_settings_of_pockets_are_needed_by_pockets_alone(tmp_path: Path) -> None:
+    """Each of the three settings may also come from the design."""
+    material = tmp_path / "cuts.toml"
+    lines = materials()["silicone-black"].read_text(encoding="utf-8").splitlines(keepends=True)
+    material.write_text("".join(line for line in lines if not line.startswith("pocket_")), encoding="utf-8")
+    complete = made_job(laser__material="silicone-black")
+    assert made_job(laser__material=str(material)).setup.repeats == complete.setup.repeats
+    pocket = {"laser__material": str(material), "laser__mode": "pocket"}
+    for field, option, value in (
+        ("pocket_power_percent", "power_percent", "20"),
+        ("pocket_speed_mm_s", "speed_mm_s", "100"),
+        ("pocket_depth_per_pass_mm", "passes", "7"),
+    ):
+        with pytest.raises(DesignError, match=rf"has no {field} for this machine.*set laser.{option}$"):
+            made_job(**pocket)
+        pocket[f"laser__{option}"] = value
+    assert made_job(**pocket).setup.repeats == 7
 
 
 def test_own_machine_and_material_files(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_options_that_are_not_used_are_named() -> None:
     assert any("mold.crown_radius_mm: 15 mm" in text and "not used on a flat pad" in text for text in flat)
     assert any('mold.projection = "vertical"' in text for text in flat)
     _, narrow = made_of(**CROWNS["sphere"], border_mm="0.5")
-    assert any("border_mm: 0.5 mm, limit 1 mm; taken that wide" in text for text in narrow)
+    assert any("border_mm: 0.5 mm, limit 1 mm; this width is taken" in text for text in narrow)
     _, clipped = made_of(**CROWNS["sphere"], layers="4", clip="circle", clip_diameter_mm="11")
     assert any("whose edge follows its crown (sphere)" in text for text in clipped)
 
