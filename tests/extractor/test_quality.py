@@ -1,4 +1,4 @@
-"""The quality of images against what they were made of, and reasons where few markers are reported."""
+"""The quality of images against their scenes, and reasons where few markers are reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The packages from outside: each alone, what loads when, and that the wheel works elsewhere."""
+"""The packages: each alone, the time of imports, and the wheel in another folder."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_importing_the_packages_is_cheap() -> None:
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel, built from the checkout by the declared backend; it takes the native modules of the checkout.
 
-    Wheels that are compiled by themselves are the subject of test_wheels.py.
+    test_wheels.py tests wheels that are compiled separately.
     """
     folder = tmp_path_factory.mktemp("wheel")
     options = [

@@ -1,4 +1,4 @@
-"""What every command does in the same way: help texts, refused paths, Ctrl-C, missing libraries."""
+"""The common behaviour of all commands: help texts, refused paths, Ctrl-C, missing libraries."""
 
 from __future__ import annotations
 

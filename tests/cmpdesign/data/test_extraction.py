@@ -35,7 +35,7 @@ CODECS = {
 
 
 def numbered_frames() -> list[np.ndarray]:
-    """Images that tell their number: the gray level."""
+    """Images whose gray level is their number."""
     noise = np.random.default_rng(0).integers(0, 6, (SIZE[1], SIZE[0], 3), np.uint8)
     return [noise + np.uint8(10 * number) for number in range(FRAMES)]
 

@@ -1,4 +1,4 @@
-"""Designs: what is accepted, what is refused and how, and the schema for editors."""
+"""Designs: accepted values, refused values with their messages, and the schema for editors."""
 
 from __future__ import annotations
 

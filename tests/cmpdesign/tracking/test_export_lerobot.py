@@ -212,7 +212,7 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def lerobot_python(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """An interpreter with lerobot, in an environment of its own of some GB; skips where it cannot be installed."""
+    """An interpreter with lerobot, in a separate environment of some GB; skips where it cannot be installed."""
     if given := os.environ.get(PYTHON_VARIABLE):
         yield given
         return

@@ -1,4 +1,4 @@
-"""The job as a user meets it: refused or made, in which order and time; and what the camera sees of the result."""
+"""The job: refused or made, its order and time, and the picture of the carved pad."""
 
 from __future__ import annotations
 
@@ -304,7 +304,7 @@ def seen(svg: str, job: LaserJob) -> tuple[Points, Points, int]:
 @pytest.mark.parametrize("name", ["honeycomb", "round"])
 @pytest.mark.parametrize("corner", ["plain", "overcut"])
 def test_the_burnt_pattern_is_read_with_no_wrong_id(name: str, corner: str) -> None:
-    """From the programs alone: swept, inked, rendered, extracted. Corners stay where they were designed."""
+    """From the programs alone: swept, inked, rendered, extracted. Corners have their designed positions."""
     job = made_job(name, laser__corner=corner, layers="6", laser__kerf_mm="0.2")
     for svg in (drawn_from_gcode(job), as_made_svg(job)):
         found, true, wrong = seen(svg, job)
@@ -314,7 +314,9 @@ def test_the_burnt_pattern_is_read_with_no_wrong_id(name: str, corner: str) -> N
 
 
 def test_paths_without_compensation_are_the_outlines(tmp_path: Path) -> None:
-    """For shops that compensate themselves; the job sheet, the program and the report say so."""
+    """Paths without compensation, for shops that compensate; the job sheet, the program and the report state the
+    absence.
+    """
     settings_ = ["layers=3", "laser.kerf_mm=0", "laser.outline=true", "laser.taper_deg=1"]
     flags = [flag for text in settings_ for flag in ("--set", text)]
     result = run("build", "honeycomb", "-o", tmp_path, "--only", "laser", *flags)
