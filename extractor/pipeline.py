@@ -47,10 +47,10 @@ from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
 from extractor.result import Markers, Origin, Reason
 
-WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
+WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MAX_DOMAINS_PER_CELL = 3  # number of domains per cell of the pattern above which an image is cluttered,
-MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains
-MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
+MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains; both chosen
+MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern; chosen
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]
@@ -204,7 +204,7 @@ class Extractor:
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.reason, stages, quality), None)
         cells, numbering = found.cells, found.numbering
-        places = stages.record("place", merge_corners(cells, numbering, self._lattice, pyramid.size))
+        places = stages.record("place", merge_corners(cells, numbering, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
     def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:

@@ -24,13 +24,15 @@ class CellMeshLimits(NamedTuple):
     """Limits of the mesh.
 
     Attributes:
-        max_flip_rounds: passes over all faces in which edges between cells of one ink are flipped.
+        max_flip_rounds: passes over all faces in which edges between cells of one ink are flipped. Measured: rule
+            "flips".
         min_area_ratio, max_area_ratio: of a face, relative to its cells' mean area; other triangles are no faces. The
-            ratio is about 1 for three neighbours, and at least 2 across a gap.
-        max_swelling: sides of the cells over the sides at which neighbours just meet. Ink that bled and overexposure
-            make cells larger; smaller cells are not changed: in clutter, separate figures must not meet.
+            ratio is about 1 for three neighbours, and at least 2 across a gap. Chosen around the one, and below the
+            other.
+        max_swelling: sides of the cells over those at which neighbours just meet. Ink that bled and overexposure make
+            cells larger; smaller ones are left as they are: in clutter, figures that lie apart must not meet. Chosen.
         max_corner_gap: L of eq. 5 (neighbouring cells share a corner), in edges of an equilateral cell of the smaller
-            area; cells whose nearest corners are farther apart form no face.
+            area; cells whose nearest corners are farther apart form no face. Measured: rule "shared corner".
     """
 
     max_flip_rounds: int = 12

@@ -18,17 +18,17 @@ class CellLimits(NamedTuple):
     """Limits of the cells' areas.
 
     Attributes:
-        nearest_cells: cells with which an area is compared.
-        min_area_share: of the neighbours' median area; smaller domains are dirt.
-        max_larger_than_cell: a domain is dirt if this number of its nearest cells are larger by this factor: half of
-            ``nearest_cells``, for the median.
-        min_intact_share: of the neighbours' upper quartile; smaller cells are cut, their centers shifted.
-        max_larger_than_intact: a cell is cut if this number of its nearest cells are larger by this factor: a quarter
-            of ``nearest_cells`` and one more, for the upper quartile.
-        min_triangle_share: share of triangles among the cells, above which every cell without a triangle is a fragment.
-        count_radii: radii within which cells are counted, in sides of a bucket; they save time and do not change the
-            result. The five by five buckets around a point hold all cells within 2; a disc of 1.1 holds about
-            ``nearest_cells``.
+        nearest_cells: cells with which an area is compared. Chosen.
+        min_area_share: of the neighbours' median area; smaller domains are dirt. Measured: rule "larger neighbours".
+        max_larger_than_cell: number of nearest cells that make a domain dirt if so much larger: half of
+            ``nearest_cells``, for the median. Derived.
+        min_intact_share: of the neighbours' upper quartile; smaller cells are cut, their centers shifted. Measured:
+            rule "intact cells".
+        max_larger_than_intact: number of nearest cells that make a cell a cut one if so much larger: a quarter of
+            ``nearest_cells`` and one more, for the upper quartile. Derived.
+        min_triangle_share: share of triangles among the cells from which on every other cell is a fragment. Chosen.
+        count_radii: within which cells are counted, in sides of a bucket; they save time and decide nothing. The five
+            by five buckets around a point hold all cells within 2; a disc of 1.1 holds about ``nearest_cells``. Chosen.
     """
 
     nearest_cells: int = 8

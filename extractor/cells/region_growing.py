@@ -17,7 +17,8 @@ class GrowLimits(NamedTuple):
     """The limit of growing.
 
     Attributes:
-        threshold: value of eq. 3 over OpenCV's 8-bit HSV, below which a pixel belongs to the region; as in the article.
+        threshold: of eq. 3 over OpenCV's 8-bit HSV, below which a pixel belongs to the region; as in the article.
+            Published: the article, below eq. 3.
     """
 
     threshold: float = 0.15

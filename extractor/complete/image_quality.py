@@ -16,17 +16,18 @@ from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.quality import UNKNOWN, Quality
 from extractor.refine.measure.gridline_weights import median_edge
 
-CELLS_PER_INK = 40  # that are sampled
-SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged
-CLIPPING_STRIDE = 4  # of the pixels by which the clipping of an image without numbers is measured
+CELLS_PER_INK = 40  # that are sampled; chosen
+SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged; chosen
+# of the pixels by which the clipping of an image without numbers is measured; chosen, for time
+CLIPPING_STRIDE = 4
 
 
 class QualityLimits(NamedTuple):
     """Limits of the quality.
 
     Attributes:
-        clipped_value: value of 255, from which on a cell's mean counts as clipped; noise lowers the mean below 255.
-        dim_quantile: share of the cells that count as the dimmest; the brightest cells are the same number.
+        clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255. Chosen.
+        dim_quantile: of the cells' light, that is the dimmest; the brightest are as many. Chosen.
     """
 
     clipped_value: float = 253.0

@@ -14,7 +14,8 @@ class LayerLimits(NamedTuple):
     """Limits of the quadratics through layers.
 
     Attributes:
-        min_markers: known markers of a layer within a sextant, for a quadratic with a residual.
+        min_markers: known markers of a layer within a sextant, for a quadratic with a residual. Derived: three
+            coefficients, and two equations over.
     """
 
     min_markers: int = 5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-MIN_FIT_MARKERS = 3  # for a map from layout to image
+MIN_FIT_MARKERS = 3  # for a map from layout to image; derived: three coefficients an axis
 
 
 def is_less_than_half_reported(

@@ -14,7 +14,7 @@ class UncertainLimits(NamedTuple):
     """Limits of uncertain markers.
 
     Attributes:
-        deviation: in edges, of a marker that other markers may predict better: at best to 0.012.
+        deviation: in edges, of a marker that others may predict better: at best to 0.012. Measured: rule "fusion".
     """
 
     deviation: float = 0.02

@@ -24,9 +24,9 @@ class VirtualLimits(NamedTuple):
     """Limits of virtual markers.
 
     Attributes:
-        max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt.
-        bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord.
-        bend_by_scatter: as in ``BendingLimits``.
+        max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt. Chosen.
+        bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord. Chosen.
+        bend_by_scatter: as in ``BendingLimits``. Derived.
     """
 
     max_measured_offset: float = 0.08

@@ -20,7 +20,7 @@ class NoiseLimits(NamedTuple):
     """Limits of the estimate of the noise.
 
     Attributes:
-        samples: pixels for the estimate; with fewer cells, several pixels in each.
+        samples: pixels for the estimate; with fewer cells, several pixels in each. Chosen.
     """
 
     samples: int = 600

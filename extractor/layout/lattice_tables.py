@@ -144,11 +144,6 @@ class Lattice:
         return np.ascontiguousarray(self.neighbours[:, FIRST_RING])
 
     @cached_property
-    def is_rim(self) -> NDArray[np.bool_]:
-        """(M,) bool, the markers that have fewer than six present neighbours."""
-        return np.asarray(~((self.first_ring >= 0) & self.present[self.first_ring]).all(axis=1))
-
-    @cached_property
     def corner_vectors_mm(self) -> NDArray[np.float64]:
         """(U, 3, 2) float64, from the centers of the colored cells to their corners."""
         return np.asarray(self.marker_mm[self.corner_ids] - self.center_mm[:, None])

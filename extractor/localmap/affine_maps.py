@@ -15,10 +15,11 @@ class AffineMapLimits(NamedTuple):
     """Limits of linear maps.
 
     Attributes:
-        min_spread: smallest ratio of the neighbours' spread across to along; below this ratio the neighbours lie on one
-            line.
-        max_misfit: of the distance to a neighbour, from its center to the prediction by a triangle.
-        min_rival_misfit: the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances.
+        min_spread: least ratio of the neighbours' spread across to along; below it they lie on one line. Chosen.
+        max_misfit: of the distance to a neighbour, from its center to the prediction by a triangle. Measured: rule
+            "mapped by triangle".
+        min_rival_misfit: the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances. Chosen
+            below that.
     """
 
     min_spread: float = 0.2

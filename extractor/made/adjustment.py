@@ -29,7 +29,7 @@ from extractor.numeric.homographies import (
 )
 
 STEPS = 20
-CONVERGED_DEVIATIONS = 1e-4  # largest step of a place, in standard deviations
+CONVERGED_DEVIATIONS = 1e-4  # largest step of a place, in standard deviations; chosen
 
 
 class Readings(NamedTuple):

@@ -25,7 +25,7 @@ from extractor.result import Markers, Status
 
 PRODUCT = "measured"
 MIN_PICTURES = 10
-MIN_SHARE = 0.5  # of the visible markers, measured in every picture
+MIN_SHARE = 0.5  # of the visible markers, measured in every picture; chosen
 MAX_PICTURE_Z = 2.0
 # After three readings the places are biased towards the nominal places by up to 0.5 deviations more (40 pictures, or a
 # scatter of 0.5 px); a fifth reading has no effect.

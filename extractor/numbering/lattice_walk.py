@@ -24,28 +24,29 @@ from extractor.numbering.outline_fit import align_to_outline
 from extractor.numbering.white_search import LayoutPlacement, placements_by_white_cell
 from extractor.result import Origin, Reason
 
-MIN_SCORE_LEAD = 2  # cells, of the best reference over the next reference in its component of the mesh
-MAX_MORE_MISSING = (
-    2  # neighbours that a second pad may miss more than the best pad; an outline in view has many
-)
-MIN_RELATIVE_WHITENESS = 0.75  # of the whitest candidate; less white candidates are no white cells
+# cells, of the best reference over the next one in its component of the mesh; measured: rule "rivals"
+MIN_SCORE_LEAD = 2
+# neighbours that a second pad misses more than the best; an outline in view is many. Chosen
+MAX_MORE_MISSING = 2
+# of the whitest candidate; less white ones are no white cells. Measured: rule "relative whiteness"
+MIN_RELATIVE_WHITENESS = 0.75
 # A component of the mesh is this pattern if it shows this share of the pattern's cells and hardly any cell is outside.
 MIN_LAYOUT_SHARE = 0.06
-MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout
-# In steep views the mesh breaks into parts that fit by chance. Therefore a component also has this share of the meshed
+MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; chosen
+# At grazing view the mesh breaks into pieces that fit by chance. So a component also holds this share of the meshed
 # cells, or this number.
 MIN_MESH_SHARE = 0.4
 SUFFICIENT_CELLS = 30
 MAX_COMPONENTS = 12
-MIN_COMPONENT_FACES = 5  # of a component whose white cell competes with another's
+MIN_COMPONENT_FACES = 5  # of a component whose white cell competes with another's; chosen
 
 
 class WalkLimits(NamedTuple):
     """Limits of a walk.
 
     Attributes:
-        max_rounds: walks of one component, each without the cells that were contradicted before; then the component is
-            dropped.
+        max_rounds: walks of one component, each without the cells contradicted before; then it is given up. Measured:
+            rule "contradictions".
     """
 
     max_rounds: int = 8

@@ -16,9 +16,9 @@ class MarkerTurnLimits(NamedTuple):
     """Limits of the samples that distinguish markers from black cells.
 
     Attributes:
-        max_sampled_faces: faces that are sampled to find the orientation of the markers.
-        min_sampled_faces: of each orientation; with fewer the orientation of the markers is unknown.
-        sample_radius: of a color sample, relative to the distance from a face's middle to its nearest cell.
+        max_sampled_faces: faces that are sampled to find the orientation of the markers. Chosen.
+        min_sampled_faces: of each orientation; with fewer the orientation of the markers is unknown. Chosen.
+        sample_radius: of a color sample, relative to the distance from a face's middle to its nearest cell. Chosen.
     """
 
     max_sampled_faces: int = 80

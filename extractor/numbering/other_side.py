@@ -15,10 +15,10 @@ from extractor.numbering.lattice_walk import Numbering
 from extractor.numeric.bilinear import fill_patch_mean
 from extractor.result import Reason
 
-SAMPLE_RADIUS = 0.1  # of the root of a cell's area, over which its color is averaged
-SWAPPED_HUES_DEG = 240.0  # the sum of a hue and of that with red and blue swapped
-MAX_HUE_ERROR_DEG = 12.0  # of the inks' hues from the palette's; colored light moves them farther
-MAX_HUE_ERROR_RATIO = 0.5  # of the smaller error to the larger error
+SAMPLE_RADIUS = 0.1  # of the root of a cell's area, over which its color is averaged; chosen
+SWAPPED_HUES_DEG = 240.0  # the sum of a hue and of that with red and blue swapped; derived
+MAX_HUE_ERROR_DEG = 12.0  # of the inks' hues from the palette's; colored light moves them farther. Chosen
+MAX_HUE_ERROR_RATIO = 0.5  # of the smaller error to the larger one; chosen
 
 
 def other_side_reason(

@@ -15,15 +15,17 @@ class OutlineLimits(NamedTuple):
     """Limits of an alignment with the outline.
 
     Attributes:
-        min_seen_share: of the layout's cells must be found.
-        max_outside_share: share of the cells found that may lie outside at the best alignment: dirt in the mesh.
-        min_margin_share: this share more must lie outside at every other alignment, and
-        min_margin_cells: at least this number of cells more.
-        shift_margin: lattice steps, by which shifts may exceed the fitting shifts.
-        max_alignments: alignments to try; with more possible alignments none is certain.
+        min_seen_share: of the layout's cells must be found. Measured: rule "outline".
+        max_outside_share: of the cells found may lie outside at the best alignment: dirt in the mesh. Measured: rule
+            "outline".
+        min_margin_share: so many more of them must lie outside at every other alignment. Measured: rule "outline
+            margin".
+        min_margin_cells: the same, as a number of cells. Measured: rule "outline margin".
+        shift_margin: lattice steps, by which shifts may exceed the fitting ones. Chosen.
+        max_alignments: alignments to try; with more possible ones none is certain. Chosen.
         rim_width: lattice steps from the outermost cells; the cells of this rim are tested first. The result does not
-            depend on it.
-        batch_size: cells that are tested between two comparisons with the limit. The result does not depend on it.
+            depend on it. Chosen.
+        batch_size: cells that are tested between two comparisons with the limit. Nor on this. Chosen.
     """
 
     min_seen_share: float = 0.5

@@ -22,9 +22,8 @@ from extractor.numbering.white_cell import WhiteCellLayout, WhiteCellLimits
 from extractor.numbering.whiteness import LIMITS as WHITENESS_LIMITS
 from extractor.numbering.whiteness import WhitenessLimits, measure_inks
 
-MIN_RELATIVE_BRIGHTNESS = (
-    0.6  # of the brightest place; a compressed black cell that is brightened by blur stays below
-)
+# of the brightest; a compressed black cell filled by blur stays below. Measured: rule "relative brightness"
+MIN_RELATIVE_BRIGHTNESS = 0.6
 
 
 class WhiteSearchLimits(NamedTuple):
@@ -33,14 +32,16 @@ class WhiteSearchLimits(NamedTuple):
     Brightness is the sum of the channels, relative to that of the inks around.
 
     Attributes:
-        min_white_ratio: brightness of white; blurred black stays below 0.5, dim white is brighter than any ink.
+        min_white_ratio: brightness of white; blurred black stays below 0.5, dim white is brighter than any ink. Chosen.
         max_black_ratio: brightness between the inks: black is darker than the inks even in haze, other images are not.
-        min_black_share: of the places between three cells; the white cell and glare are among these places.
-        min_enclosed_places: number of places between three cells; with fewer, places next to one or two cells count,
-            too.
-        max_white_candidates: places tried in a ring, the brightest.
-        min_weakest_channel: least whiteness.
-        min_weakest_channel_far: the same where no walked cell touches the place.
+            Measured: rule "dark between inks".
+        min_black_share: of the places between three cells; the white cell and glare are among these places. Measured:
+            rule "dark between inks".
+        min_enclosed_places: such places; if fewer, places next to one or two cells count, too. Measured: rule "dark
+            between inks".
+        max_white_candidates: places tried in a ring, the brightest. Chosen.
+        min_weakest_channel: least whiteness. Chosen.
+        min_weakest_channel_far: the same where no walked cell touches the place. Chosen.
         cell, whiteness, prediction: of the modules that do these steps.
     """
 

@@ -156,7 +156,7 @@ class EdgeContrasts(NamedTuple):
     """The change of color across the gridlines; the change does not depend on shifts of a gridline by a pixel.
 
     Attributes:
-        sides: (E, 6) light on both sides, as ``gridline_sides`` gives it.
+        sides: (E, 6) light on both sides, as ``GridlineSides`` gives it.
         contrasts: (E, 3) gray levels, differences of the values on both sides.
         clearance: (E, 4), as ``gridline_clearance`` gives it.
     """

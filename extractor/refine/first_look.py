@@ -22,16 +22,17 @@ from extractor.refine.synthesis.blur_bleed import BleedLimits, remove_bleed
 from extractor.refine.synthesis.ink_levels import LIMITS as LEVEL_LIMITS
 from extractor.refine.synthesis.ink_levels import InkLevelLimits, InkLevels
 
-DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured
-MIN_CORRECTED_BLEED = 0.002  # of a neighbour's level in the middle of a cell, above which bleed is removed
+DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured; chosen
+# of a neighbour's level in the middle of a cell, above which bleed is removed; chosen
+MIN_CORRECTED_BLEED = 0.002
 
 
 class FirstLookLimits(NamedTuple):
     """Limits of the first look.
 
     Attributes:
-        fallback_sigma_px: the blur where no gridline can be measured.
-        blur_gridlines: gridlines for the first estimate of the blur.
+        fallback_sigma_px: the blur where no gridline shows it. Chosen.
+        blur_gridlines: gridlines for the first estimate of the blur. Chosen.
         noise: of the estimate of the noise.
         levels: of the inks.
         profiles: of the profiles across gridlines.

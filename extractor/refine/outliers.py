@@ -28,16 +28,19 @@ class OutlierLimits(NamedTuple):
     """Limits of outliers. The native code has room for two ratios and two shifts.
 
     Attributes:
-        min_mean_weight: of the gridlines measured at a marker, below which the marker is suspect.
-        outlier_ratios: shift of an outlier over that of the markers around, of a suspect marker and of any other;
-        min_outlier_shifts: and that shift in edges.
-        min_agreeing_share: the gridlines of a marker agree on a shift if more than this share of them,
-        min_agreeing_gridlines: and no fewer than this number,
-        agreement_tolerance: give a shift that differs by less than this share of the shift.
-        extrapolated_rings: of outliers that the markers around are continued to.
-        max_rounds: an outlier hides the errors of its neighbours.
-        max_place_error: in edges, between a marker's place by its neighbours and a correct initial place.
+        min_mean_weight: of the gridlines measured at a marker, below which the marker is suspect. Chosen.
+        outlier_ratios: shift of an outlier over that of the markers around, of a suspect marker and of any other.
+            Chosen.
+        min_outlier_shifts: the least such shifts, in edges. Chosen.
+        min_agreeing_share: the gridlines of a marker agree on a shift if more than this share of them do. Chosen.
+        min_agreeing_gridlines: the same, as a number of gridlines. Chosen.
+        agreement_tolerance: share of a shift, by which the shifts of gridlines that agree may differ. Chosen.
+        extrapolated_rings: of outliers that the markers around are continued to. Chosen.
+        max_rounds: an outlier hides the errors of its neighbours. Chosen.
+        max_place_error: in edges, between a marker's place by its neighbours and a correct initial place. Derived: as
+            in ``marker_places``.
         rounding_allowance: of the squared least shift; a marker whose largest differences stay below cannot move.
+            Derived: below 1 by more than rounding.
         gridlines: of the maps that continue the markers around.
     """
 

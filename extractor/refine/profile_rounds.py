@@ -28,16 +28,16 @@ from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 
 SAMPLE_MISFIT_RULE = MisfitRule(1, 4, 1.0)
-MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile
+MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile; chosen
 
 
 class ProfileLimits(NamedTuple):
     """Limits of a round of profiles.
 
     Attributes:
-        misfit_tolerance: share of the contrast; a misfit of this size, as by glare and uneven light, does not lower the
-            weight.
-        rule: rule of the gridlines' weights.
+        misfit_tolerance: of the contrast; what glare and uneven light make in a profile does not lower its weight.
+            Chosen.
+        rule: by which gridlines are weighed.
         step: of the step.
         rows: of the rows of pixels.
         dot_gain: of the dot gain.

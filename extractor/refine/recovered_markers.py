@@ -28,9 +28,9 @@ class RecoveryLimits(NamedTuple):
     """Limits of the round.
 
     Attributes:
-        stations: of a gridline.
-        reference_interval: one in this number of other gridlines is read.
-        min_reference_gridlines: other gridlines for the usual misfit; with fewer, all together give it.
+        stations: of a gridline. Chosen.
+        reference_interval: one of so many other gridlines is read. Chosen.
+        min_reference_gridlines: other gridlines for the usual misfit; with fewer, all together give it. Chosen.
         profiles: of the profiles.
         gridlines: of the gridlines.
         acceptance: of the markers.

@@ -22,7 +22,7 @@ from extractor.refine.solve.fisher_information import Information, InformationLi
 from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
 from extractor.refine.synthesis.gridlines import gridlines
 
-PRIOR_PX = 10.0  # deviation of a marker before it is measured
+PRIOR_PX = 10.0  # deviation of a marker before it is measured; chosen, far above any error
 
 
 class MisfitRule(NamedTuple):
@@ -46,7 +46,7 @@ class StepLimits(NamedTuple):
     """Limits of a step.
 
     Attributes:
-        prior_px: deviation of a marker before it is measured.
+        prior_px: deviation of a marker before it is measured. Chosen.
         weights: of the gridlines.
         bending: of the gridlines.
         information: about the markers.

@@ -55,12 +55,12 @@ from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
 from extractor.refine.synthesis_steps import SynthesisSolver
 
-SHARP_SIGMA_PX = 1.15  # blur of an image in focus; half the scale of such an image is used first
-SMALL_BLUR = 0.12  # of an edge; above, one edge is blurred into the next
-SHORT_RARITY = 30  # one gridline in this number may be shorter than MIN_EDGE_PX at a reduced scale
-MIN_EDGE_PX = 4.0  # edges at a reduced scale; where one edge is blurred into the next,
-MIN_BLURRED_EDGE_PX = 6.5  # either these edges
-MIN_BLUR_PX = 0.65  # or this blur
+SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first. Chosen
+SMALL_BLUR = 0.12  # of an edge; above, one edge is blurred into the next. Chosen
+SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at a reduced scale; chosen
+MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
+MIN_BLURRED_EDGE_PX = 6.5  # either these
+MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
 # Noise of the drawing over that of the pixels, above which the drawing explains too little to move a marker far.
 UNEXPLAINED_NOISE_RATIO = 3.0
 
@@ -69,7 +69,7 @@ class FullScaleLimits(NamedTuple):
     """Limits of the markers at the full scale.
 
     Attributes:
-        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree.
+        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree. Chosen.
     """
 
     agreed_deviation: float = AGREED_DEVIATION

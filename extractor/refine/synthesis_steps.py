@@ -32,11 +32,11 @@ from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 
-WIDE_BLUR = 0.1  # of a usual edge: above this share, errors of neighbours look like bending
+WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending. Chosen
 # Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
 # (rendered patterns, shifted), at most by MAX_OVERLAP.
 OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
-MAX_PICTURES = 2  # number of image shapes with kept pictures
+MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
 NO_CLEARANCE = np.empty((0, 4))
 
 
@@ -48,8 +48,8 @@ class SynthesisLimits(NamedTuple):
         step: of the step.
         dot_gain: of the dot gain.
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
-            follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge
-            by 0.15 in the second step.
+            follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
+            0.15 in the second step. Measured: rule "settled appearance".
     """
 
     rule: MisfitRule = PIXEL_MISFIT_RULE

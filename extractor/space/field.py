@@ -18,11 +18,11 @@ from extractor.layout.reference import Reference
 from extractor.numeric.nearest_points import nearest_points
 from extractor.space.camera import Array, is_finite
 
-MIN_CUBIC_NEIGHBOURS = 10  # known neighbours for the polynomial of 9 terms
-MIN_QUADRATIC_NEIGHBOURS = 5  # for the polynomial of 5 terms; with fewer neighbours, a plane
-MAX_CONDITION = 1e3  # of the normal equations; complete rings have 4 to 170
-CANDIDATES = 12  # nearest triangles (by centroid) that are searched for a point
-MIN_BARYCENTRIC = -1e-9  # of a point in a triangle
+MIN_CUBIC_NEIGHBOURS = 10  # known neighbours for the polynomial of 9 terms; derived: one equation over
+MIN_QUADRATIC_NEIGHBOURS = 5  # for that of 5 terms; fewer get the plane
+MAX_CONDITION = 1e3  # of the normal equations; complete rings have 4 to 170. Chosen above these
+CANDIDATES = 12  # nearest triangles (by centroid) that are searched for a point; chosen
+MIN_BARYCENTRIC = -1e-9  # of a point in a triangle; derived: rounding
 
 
 class Field:

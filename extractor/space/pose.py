@@ -20,13 +20,13 @@ from extractor.space.medium import Medium
 from extractor.space.pose_refinement import RefinedPoses, RestMarkers, refine_poses
 from extractor.space.rest_check import RestViews, rest_warning
 
-MIN_MARKERS = 6  # of a view, for a pose
-MAX_CONDITION = 1e4  # of the markers' scatter; collinear markers determine no pose
-OUTLIER_RATIO = 6.0  # misfit of an outlier relative to the median
-MAX_OUTLIER_ROUNDS = 3
-MIN_CHI2_GAP = 25.0  # between the two poses of a plane; 5 standard deviations
-MAX_RMS_EDGES = 0.2  # RMS residual at rest, in edges
-SAME_DEG = 0.5  # angle below which two poses are the same
+MIN_MARKERS = 6  # of a view, for a pose; chosen: six unknowns, twice as many equations
+MAX_CONDITION = 1e4  # of the markers' scatter; collinear markers determine no pose. Chosen
+OUTLIER_RATIO = 6.0  # misfit of an outlier relative to the median; chosen
+MAX_OUTLIER_ROUNDS = 3  # of dropping such markers; chosen
+MIN_CHI2_GAP = 25.0  # between the two poses of a plane; 5 standard deviations. Chosen
+MAX_RMS_EDGES = 0.2  # RMS residual at rest, in edges; chosen
+SAME_DEG = 0.5  # angle below which two poses are the same; chosen
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,9 +21,9 @@ from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
 from extractor.space.triangulation import GATE_SIGMAS, INFLATION_SIGMAS, PointReason, Points, triangulate
 
-MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position above which it is not reported, in edges
-NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers above which covariances are inflated
-MIN_REST_MARKERS = 3  # markers that must have a position at rest
+MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position above which it is not reported, in edges; chosen
+NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers above which covariances are inflated; chosen
+MIN_REST_MARKERS = 3  # markers that must have a position at rest; derived: a plane
 
 
 @dataclass(frozen=True, eq=False)

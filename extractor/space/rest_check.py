@@ -19,9 +19,10 @@ from extractor.space.camera import Array, View, is_finite
 from extractor.space.medium import Medium, WindowPlane
 from extractor.space.pose_refinement import RefinedPoses, RestMarkers, refine_poses
 
-MAX_MISFIT = 3.0  # RMS residual at rest in its deviations, above which the model of the sensor is doubted
-EXPLAINED = 0.5  # share of the misfit that the likely cause may leave
-USUAL_GEL_INDEX, USUAL_WINDOW_INDEX = 1.41, 1.49  # silicone and acrylic, where the rig has no indices
+# RMS residual at rest in its deviations, above which the model of the sensor is doubted; chosen
+MAX_MISFIT = 3.0
+EXPLAINED = 0.5  # share of the misfit that the likely cause may leave; chosen
+USUAL_GEL_INDEX, USUAL_WINDOW_INDEX = 1.41, 1.49  # silicone and acrylic, where the rig has none
 GEL_TOLERANCE_MM = 0.01
 STEPS = {"window_mm": 0.1, "gel_index": 0.01, "window_index": 0.01}
 TILT_STEP = 0.01  # rad

@@ -26,13 +26,13 @@ from extractor.track.ink_alignment import resting_shifts
 from extractor.track.warm_start import WarmStart, select_prediction, verify_prediction
 from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_missing_markers
 
-MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a cold start may find more
-WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice
-EDGE_SAMPLING_STEP = 8  # one of this number of edges is measured for the choice of that scale
-COLD_START_INTERVAL = 200  # frames after which a cold start is done
-# Warm passes over the image of a cold start. Warm frames start from levels and blur of the previous frame: without
-# these passes, equal frames after a cold start differ from it by 0.18 stated standard deviations (median), with two by
-# 0.04.
+MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a cold start may find more. Chosen
+WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice; chosen
+# one of this number of edges is measured for the choice of that scale; chosen, for time
+EDGE_SAMPLING_STEP = 8
+COLD_START_INTERVAL = 200  # frames after which a cold start is done; chosen
+# Warm passes over the image of a cold start. Warm frames start from levels and blur of the frame before: without these
+# passes, equal frames after a cold start differ from it by 0.18 stated standard deviations (median), with two by 0.04.
 SETTLING_PASSES = 2
 
 

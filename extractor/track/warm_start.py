@@ -23,17 +23,20 @@ from extractor.track.image_check import CONFIRMED, check_cells
 from extractor.track.ink_alignment import align_to_inks
 from extractor.track.warm_tables import WarmTables
 
-MIN_PREDICTED = 0.8  # of the cells in view whose middles must show their ink under a predicted position
-MIN_WHITE_EDGES = 2  # of a cell's three edges across which it is bright, for the white cell and for a rival
+# of the cells in view whose middles must show their ink under a predicted position; chosen
+MIN_PREDICTED = 0.8
+# of a cell's three edges across which it is bright, for the white cell and for a rival; chosen
+MIN_WHITE_EDGES = 2
 
 
 class WarmStartLimits(NamedTuple):
     """Limits of the proof.
 
     Attributes:
-        center_radius_px: of the disc over which a middle's color is averaged.
-        min_center_strength: of a middle's ink level, relative to the previous frame, for the middle to show its ink.
-        min_verified_share: of the cells in view that the image must confirm.
+        center_radius_px: of the disc over which a middle's color is averaged. Chosen.
+        min_center_strength: of a middle's ink level, relative to the frame before, for the middle to show its ink.
+            Chosen.
+        min_verified_share: of the cells in view that the image must confirm. Chosen.
     """
 
     center_radius_px: float = 0.5
@@ -133,7 +136,6 @@ def verify_prediction(
     places = InitialMarkers(
         level.to_full_scale(verified.xy_px),
         aligned.edge_px * level.scale,
-        tables.corners[proved],
         *agreement,
     )
     return WarmStart(places, np.where(proved[:, None], check.cell_levels, levels_before), by_rim)

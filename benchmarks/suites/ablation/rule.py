@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from benchmarks.support.code_copy import Replacement
 
-Kind = Literal["accuracy", "no wrong id"]
+Kind = Literal["accuracy", "errors and time", "no wrong id"]
 
 
 class Rule(NamedTuple):
@@ -21,9 +21,10 @@ class Rule(NamedTuple):
     Attributes:
         name: name of the rule.
         purpose: what the rule is for.
-        kind: criterion of the rule: counts and errors in the five suites, or the wrong ids that the rule prevents.
-        file: file of the reader's source, relative to the checkout.
-        text: text of the file, to be replaced.
+        kind: by what it is judged: by counts and errors in the five suites, by z and processor time, too, or by the
+            wrong ids that it prevents.
+        file: of the reader's source, relative to the checkout.
+        text: of the file, to be replaced.
         without: the text that replaces it and switches the rule off.
     """
 

@@ -28,7 +28,7 @@ struct PatternState {
 
 // The change of color across the gridlines.
 struct EdgeContrasts {
-  View<const double, 2> sides;      // (E, 6) light on both sides, as gridline_sides gives it
+  View<const double, 2> sides;      // (E, 6) light on both sides, as GridlineSides gives it
   View<const double, 2> contrasts;  // (E, 3) gray levels, differences of the values on both sides
   View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it
 

@@ -12,13 +12,15 @@ class CellClaimLimits(NamedTuple):
     """Limits of assignments.
 
     Attributes:
-        joint_gap: cells not farther than this from a numbered cell, in cells, are numbered in one round,
-        joint_gap_ratio: and cells not farther than this many times the smallest gap.
+        joint_gap: cells not farther than this from a numbered one, in cells, are numbered in one round. Measured: rule
+            "nearest first".
+        joint_gap_ratio: so are cells not farther than this many times the least gap. Chosen.
         max_place_misfit: in cells, between a cell's predicted place and the layout's cell. Cells of one ink are 1.7
-            cells apart, so that a smaller misfit is unambiguous.
-        rival_distance: in cells, between possible fragments of one cell; the next cell of the ink is at 1.7.
-        max_gap_ratio: share of ``maps.max_support_distance``, the gap from which on a cell is not evaluated; a map
-            would be uncertain there.
+            cells apart, so that a smaller misfit is unambiguous. Chosen.
+        rival_distance: in cells, between possible fragments of one cell; the next cell of the ink is at 1.7. Chosen
+            below that.
+        max_gap_ratio: of ``maps.max_support_distance``, the gap from which on a cell is not evaluated; a map would be
+            uncertain there. Chosen.
         maps: of the quadratic maps.
     """
 

@@ -23,8 +23,8 @@ class DetachedLimits(NamedTuple):
     """Limits of the numbering of detached cells.
 
     Attributes:
-        max_rounds: of the numbering outward.
-        min_numbered_cells: intact ones, for any prediction.
+        max_rounds: of the numbering outward. Chosen.
+        min_numbered_cells: intact ones, for any prediction. Measured: rule "claims".
         claims: of the assignments by prediction.
         check: of the consistency across gaps, and of the contacts.
     """

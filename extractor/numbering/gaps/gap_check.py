@@ -25,17 +25,19 @@ class GapCheckLimits(NamedTuple):
     wrong step makes 1.7.
 
     Attributes:
-        max_median_jump: the median jump of a block.
-        max_jump_share: share of a block's jumps that may be larger.
-        max_single_jump: of a cell without contacts: its center may be shifted.
-        max_gap: between the two sides, in cells.
-        max_gap_ratio: vectors of a block not longer than this many times its shortest are compared.
+        max_median_jump: the median jump of a block. Measured: rule "gap check".
+        max_jump_share: share of a block's jumps that may be larger. Measured: rule "gap check".
+        max_single_jump: of a cell without contacts: its center may be shifted. Measured: rule "single cells".
+        max_gap: between the two sides, in cells. Measured: rule "gap check".
+        max_gap_ratio: vectors of a block not longer than this many times its shortest are compared. Chosen.
         min_slope_spread: the determinant of the neighbours' vectors over their squared sum; below it they lie on one
-            line, and give no slope.
-        reference_candidates: number of cells nearest to the white cell; their largest block is the reference.
-        white_cell_neighbours: numbered cells nearest to the white cell, which predict its place.
-        min_white_cell_neighbours: smallest number of these cells.
-        max_white_cell_misfit: in cells, the median distance from the predictions; a wrong step makes 1.7.
+            line, and give no slope. Chosen.
+        reference_candidates: cells nearest to the white one, of which the largest block is the reference. Chosen.
+        white_cell_neighbours: numbered cells nearest to the white cell, which predict its place. Measured: rule "white
+            contradicted".
+        min_white_cell_neighbours: least number of them. Measured: rule "white contradicted".
+        max_white_cell_misfit: in cells, the median distance from the predictions; a wrong step makes 1.7. Measured:
+            rule "white contradicted".
         contact: of the cells' contacts and maps.
     """
 

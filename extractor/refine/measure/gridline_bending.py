@@ -29,22 +29,27 @@ class BendingLimits(NamedTuple):
 
     Attributes:
         min_bend_share, max_bend_share: b and s over the differences around them (RMS) where these are smooth, and at
-            most; from the surfaces under balls that press, shear and twist.
+            most; from the surfaces under balls that press, shear and twist. Measured on these, by no command that is
+            kept.
         bend_to_end_shift: the shift of a gridline's ends that remains, in deviations of b and s; from these surfaces.
-        max_bend_deviation: in units of the gridline's length.
+            Measured on them, likewise.
+        max_bend_deviation: in units of the gridline's length. Chosen.
         third_difference_noise: the noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some
-            allowance for its scatter.
-        mean_over_median: a mean of squares against their median.
-        misfit_tolerance: five deviations of the shift of the ends, squared,
-        max_misfit_tolerance: and at most, in units of the blur, squared.
-        min_significance: deviations by which bending must exceed its noise.
-        max_bend: b and s, in units of the gridline's length.
-        bend_by_scatter: the least variance of b and s over that of the markers' scatter.
+            allowance for its scatter. Derived: twice 20, times an allowance of 2, which is chosen.
+        mean_over_median: a mean of squares against their median. Chosen near the 2.2 of the square of a normal
+            variable.
+        misfit_tolerance: five deviations of the shift of the ends, squared. Chosen.
+        max_misfit_tolerance: the most of that, in units of the blur, squared. Chosen.
+        min_significance: deviations by which bending must exceed its noise. Chosen.
+        max_bend: b and s, in units of the gridline's length. Chosen.
+        bend_by_scatter: the least variance of b and s over that of the markers' scatter. Derived by Monte Carlo, see
+            ``BEND_BY_SCATTER``.
         min_determinant_share: of the product of the sums at both ends; a gridline whose determinant is smaller does not
-            show bending.
+            show bending. Chosen.
         min_information_share: of the information about b with both ends held; a gridline with less does not show
-            bending.
-        band: in units of the blur, the distance from a gridline within which pixels count.
+            bending. Chosen.
+        band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
+            ``PixelRowLimits``.
     """
 
     min_bend_share: float = 0.01

@@ -18,10 +18,11 @@ class OffsetLimits(NamedTuple):
     """Limits of the offsets.
 
     Attributes:
-        clear_sigma: in units of the blur, the smallest distance of the next gridline where no pattern was drawn.
-        min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast.
-        min_offset_weight: of a gridline, for its offsets to be measured.
-        band: in units of the blur, the distance from a gridline within which pixels count.
+        clear_sigma: in units of the blur, the least distance of the next gridline where nothing was drawn. Chosen.
+        min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast. Chosen.
+        min_offset_weight: of a gridline, for its offsets to be measured. Chosen.
+        band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
+            ``PixelRowLimits``.
     """
 
     clear_sigma: float = 2.0
@@ -38,7 +39,7 @@ class GridlineReading(NamedTuple):
 
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
-        sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
+        sides: (E, 6), the light on both sides, as ``GridlineSides`` gives it.
         added: (E, 6), the light to add to the drawing on both sides; the sides themselves where no pattern was drawn.
         clearance: (E, 4), from ``gridline_clearance``; used where no pattern was drawn.
         weight: (E,) 0 to 1.

@@ -19,9 +19,10 @@ class ConvergenceLimits(NamedTuple):
     """Limits of the remaining error after the last step.
 
     Attributes:
-        remaining_share: of a step, per blur, that another step would still correct.
-        max_remaining_share: of a step, at most.
-        mean_over_median: of squares, by which the median of the squared shifts becomes their mean.
+        remaining_share: of a step, per blur, that another step would still correct. Chosen.
+        max_remaining_share: of a step, at most. Chosen.
+        mean_over_median: of squares, by which the median of the squared shifts becomes their mean. Derived: 1 / ln 2,
+            of the sum of two normal squares.
     """
 
     remaining_share: float = 1.0

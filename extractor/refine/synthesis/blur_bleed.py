@@ -20,7 +20,7 @@ class BleedLimits(NamedTuple):
     """Limits of bleed.
 
     Attributes:
-        max_bleed: share of a neighbour in a cell's mean, the most that is corrected.
+        max_bleed: share of a neighbour in a cell's mean, the most that is corrected. Chosen.
         disc: limits of the disc in a cell's middle.
     """
 

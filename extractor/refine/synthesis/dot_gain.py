@@ -18,10 +18,10 @@ class DotGainLimits(NamedTuple):
     """Limits of dot gain.
 
     Attributes:
-        min_gridlines, max_gridlines: gridlines from which the dot gain is measured; with no more than the smallest
-            number, it is taken as 0, and of more than the most, every n-th is used.
-        min_dot_gain: in units of the blur; a smaller value, as by drawings, compression and glare, is taken as 0.
-        min_sine: of the angle of a corner; a sharper corner moves no farther.
+        min_gridlines, max_gridlines: gridlines that the dot gain is measured from; with no more than the least, it is
+            taken as 0, and of more than the most, every n-th is used. Chosen.
+        min_dot_gain: in units of the blur; drawings, compression and glare look like less, which is taken as 0. Chosen.
+        min_sine: of the angle of a corner; a sharper corner moves no farther. Chosen.
     """
 
     min_gridlines: int = 40

@@ -24,8 +24,8 @@ class GridlineLimits(NamedTuple):
     """Limits of gridlines.
 
     Attributes:
-        max_slope: of a gridline against its chord; a larger slope is an error of the map.
-        min_length_px: px, of the chord; no shorter gridline is known.
+        max_slope: of a gridline against its chord; a larger slope is an error of the map. Chosen.
+        min_length_px: px, of the chord; no shorter gridline is known. Chosen.
         maps: limits of the maps where a ring is incomplete.
     """
 

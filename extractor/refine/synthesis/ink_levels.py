@@ -22,10 +22,10 @@ class DiscLimits(NamedTuple):
     """Limits of the disc in a cell's middle, whose mean is the cell's level.
 
     Attributes:
-        disc_share: largest radius of the disc of a cell's level, as a share of the inscribed circle's radius.
-        first_disc_share: the same before the first drawing, when the neighbours' ink bleeds into the disc.
-        clear_sigma: in units of the blur, the distance of the disc from the cell's sides.
-        min_radius_px: px, of the disc.
+        disc_share: of the inscribed circle's radius, the disc of a cell's level at most. Chosen.
+        first_disc_share: the same where nothing is drawn yet, and the neighbours' ink bleeds into the disc. Chosen.
+        clear_sigma: in units of the blur, the distance of the disc from the cell's sides. Chosen.
+        min_radius_px: px, of the disc. Chosen.
     """
 
     disc_share: float = 0.55
@@ -38,7 +38,8 @@ class InkLevelLimits(NamedTuple):
     """Limits of ink levels.
 
     Attributes:
-        cells_for_terms: number of cells from which on an ink's polynomial has a number of terms.
+        cells_for_terms: from so many cells on, so many terms of an ink's polynomial. Derived: polynomials of degree 3,
+            2, 1 and 0 have so many; the cells are chosen.
         disc: of the disc in a cell's middle.
         polynomial: of the robust fit.
     """

@@ -20,7 +20,7 @@ struct OffsetLimits {
 // The gridlines and the levels beside them, where refinement last compared the image with the pattern.
 struct GridlineReading {
   View<const double, 2> lines;      // (E, 8), as gridlines gives them
-  View<const double, 2> sides;      // (E, 6), the light on both sides, as gridline_sides gives it
+  View<const double, 2> sides;      // (E, 6), the light on both sides, as GridlineSides gives it
   View<const double, 2> added;      // (E, 6), the light to add to the drawing; the sides where none was drawn
   View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it; used where no pattern was drawn
   View<const double, 1> weight;     // (E,) 0 to 1
