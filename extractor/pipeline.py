@@ -199,7 +199,9 @@ class Extractor:
         pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Unnumbered):
-            quality = stages.record("quality", measure_quality_without_numbers(pyramid.level(1), found.cells))
+            has_pattern = found.reason not in (Reason.NO_COLOR, Reason.NO_PATTERN)
+            quality = measure_quality_without_numbers(pyramid.level(1), found.cells, has_pattern)
+            stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.reason, stages, quality), None)
         cells, numbering = found.cells, found.numbering
         places = stages.record("place", merge_corners(cells, numbering, self._lattice))

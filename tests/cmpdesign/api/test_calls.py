@@ -1,4 +1,4 @@
-"""Every command is one call: the calls do what the commands do, and take what a program has at hand."""
+"""Every command is one call: the calls have the results of the commands, and accept paths and objects."""
 
 from __future__ import annotations
 
