@@ -1,4 +1,4 @@
-"""The median of a few numbers, and a place of the sorted numbers, as the compiled loops take them."""
+"""The median of a few numbers, and the number at a place of the sorted numbers, by the compiled loops."""
 
 from __future__ import annotations
 

@@ -25,14 +25,14 @@ from extractor.refine.synthesis.ink_levels import InkLevelLimits, InkLevels
 from extractor.refine.synthesis.pixel_rows import LIMITS as ROW_LIMITS
 from extractor.refine.synthesis.pixel_rows import PixelRowLimits
 
-MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn
+MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn; derived: 6e-5 of a blurred edge lies beyond
 
 
 class DrawingLimits(NamedTuple):
     """Limits of the drawing.
 
     Attributes:
-        blur_step: of the blur, for derivatives of the levels.
+        blur_step: of the blur, for derivatives of the levels. Chosen.
         gridlines: of the gridlines.
         levels: of the inks.
         bleed: of the neighbours' levels.

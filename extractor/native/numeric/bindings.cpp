@@ -1,4 +1,4 @@
-// Room "numeric" as Python sees it.
+// Room "numeric" for Python.
 #include "base/binding.hpp"
 
 #include "base/processor.hpp"

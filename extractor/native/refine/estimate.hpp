@@ -1,4 +1,4 @@
-// What refinement passes from step to step: the parts that compiled functions take.
+// The values that refinement passes from step to step: the parts that compiled functions take.
 #pragma once
 
 #include "base/array.hpp"
@@ -6,7 +6,7 @@
 
 namespace cmp::refine {
 
-// Where the pattern is thought to be.
+// The estimated places of the pattern.
 struct PatternState {
   View<const double, 2> xy;         // (M, 2) px
   View<const bool, 1> hidden;       // (M,) markers that the image shows little or not at all
