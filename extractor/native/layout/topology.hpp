@@ -24,6 +24,8 @@ struct Topology {
   View<const std::int32_t, 2> next_markers;
   View<const double, 2> third_differences;  // (E, 2) the layout's third difference along these four markers
   View<const std::int32_t, 2> next_edges;   // (M, 6) the edge that follows each spoke on the same gridline
+  // (E, 3) how a gridline moves with its start, its end and the other end, relative to a straight line
+  View<const double, 2> end_couplings;
 
   template <class F>
   static Topology read(const F& f) {
@@ -40,7 +42,8 @@ struct Topology {
             f["edge_vectors"],
             f["next_markers"],
             f["third_differences"],
-            f["next_edges"]};
+            f["next_edges"],
+            f["end_couplings"]};
   }
 };
 

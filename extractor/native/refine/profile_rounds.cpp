@@ -59,6 +59,7 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
                               weight,
                               lines,
                               contrasts,
+                              topology.end_couplings,
                               edges,
                               spokes,
                               state.sigma,

@@ -76,6 +76,7 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
   const Array<double, 2> bend = selected_rows(state.bend, numbers);
   const Array<double, 2> sides = selected_rows(contrasts.sides, numbers);
   const Array<double, 2> across = selected_rows(contrasts.contrasts, numbers);
+  const Array<double, 2> couplings = selected_rows(topology.end_couplings, numbers);
   const Array<double, 2> clearance = selected_rows(contrasts.clearance, numbers);
   Array<double, 2> lines =
       gridlines(state.xy, state.maps, bend, ends, selected_rows(topology.edge_vectors, numbers),
@@ -140,10 +141,12 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
   if (std::find(asked.begin(), asked.end(), true) == asked.end()) return;
   const Array<double, 1> prior = held_information(state.hidden, markers.xy, own.markers, step);
   const Array<double, 2> across = selected_rows(contrasts.contrasts, numbers);
+  const Array<double, 2> couplings = selected_rows(topology.end_couplings, numbers);
   const GridlineSystem system{read.sums.slice(0, count),
                               weight,
                               read.lines.slice(0, count),
                               across,
+                              couplings,
                               own.ends,
                               own.spokes,
                               state.sigma,

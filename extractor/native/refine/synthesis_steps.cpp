@@ -27,9 +27,8 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
       weigh_gridlines(sums, gradients, pardon, static_cast<double>(rule.values),
                       static_cast<double>(rule.min_places), rule.default_weight, weights);
   const double noise = std::isfinite(weighed.noise) ? weighed.noise : state.noise;
-  const GridlineSystem system{sums,      weighed.weight, lines,
-                              contrasts, edges,          topology.spokes,
-                              sigma,     noise * noise,  state.scatter.share};
+  const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,     topology.end_couplings,
+                              edges, topology.spokes, sigma, noise * noise, state.scatter.share};
   WeighedSolution solved = solve_weighed(system, gradients, drawing.bend, bent.response,
                                          {state.xy, state.hidden}, true, judged, limits.step);
   return {std::move(weighed.weight),

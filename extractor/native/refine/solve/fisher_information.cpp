@@ -11,6 +11,8 @@ namespace cmp::refine {
 
 namespace {
 
+constexpr Index BETWEEN = 2;  // of a gridline's couplings: its two ends with each other
+
 // Writes the product of the matrix and a vector (M, 2) into out (M, 2).
 void fill_product(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
                   View<const std::int32_t, 2> edges, View<const double, 2> vector, View<double, 2> out) {
@@ -90,19 +92,20 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     diagonal(m, 0) = diagonal(m, 2) = prior[m];
     diagonal(m, 1) = 0.0;
   }
-  const double coupling = limits.smooth_map_coupling * (1.0 - system.scatter_share);
-  const double own = 1.0 + coupling, between = 1.0 - coupling;
+  const double smooth = 1.0 - system.scatter_share;
   for (Index e = 0; e < edges.size(); ++e) {
     const double w = system.weight[e] * lines(e, KNOWN) / system.variance;
     if (w == 0.0) continue;
     const double nx = -lines(e, UY), ny = lines(e, UX);
     for (Index side = 0; side < 2; ++side) {
       const Index m = edges(e, side);
+      const double own = 1.0 + smooth * (system.couplings(e, side) - 1.0);
       const double value = w * own * (side == 0 ? sums(e, AA) : sums(e, BB));
       diagonal(m, 0) += value * nx * nx;
       diagonal(m, 1) += value * nx * ny;
       diagonal(m, 2) += value * ny * ny;
     }
+    const double between = 1.0 + smooth * (system.couplings(e, BETWEEN) - 1.0);
     const double value = w * between * sums(e, AB);
     off_diagonal(e, 0) += value * nx * nx;
     off_diagonal(e, 1) += value * nx * ny;

@@ -30,6 +30,7 @@ struct GridlineSystem {
   View<const double, 1> weight;        // (E,) 0 to 1; a gridline that is not drawn counts as 0
   View<const double, 2> lines;         // (E, 8), as gridlines gives them
   View<const double, 2> contrasts;     // (E, 3) gray levels
+  View<const double, 2> couplings;     // (E, 3), the topology's end_couplings
   View<const std::int32_t, 2> edges;   // (E, 2) the markers at the gridlines' ends
   View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
   double sigma;                        // the blur, px
@@ -39,15 +40,14 @@ struct GridlineSystem {
 
 // Limits of the information; explained in extractor/refine/solve/fisher_information.py.
 struct InformationLimits {
-  double smooth_map_coupling, held_information;
+  double held_information;
   Index max_steps;
   double precision, min_determinant;
   SharedPixelLimits shared;
 
   template <class F>
   static InformationLimits read(const F& f) {
-    return {f["smooth_map_coupling"], f["held_information"], f["max_steps"],
-            f["precision"],           f["min_determinant"],  f["shared"]};
+    return {f["held_information"], f["max_steps"], f["precision"], f["min_determinant"], f["shared"]};
   }
 };
 
