@@ -7,13 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.layout.gridline_slopes import end_couplings, scatter_bending, slope_weights
 from extractor.layout.reference import BLACK, Reference
 from extractor.localmap.regularised_maps import LIMITS as MAP_LIMITS
 
 MAX_NEIGHBOURS = 6  # of a marker
 MAX_RING_MARKERS = 18  # in the two rings around a marker
 MAP_DERIVATIVES = 5  # x, y, xx, xy, yy
-MAX_CONDITION = 1e8  # of the normal equations of a cubic
+MAX_CONDITION = (
+    1e4  # of the normal equations of a map; cubics have 2e2 to 3e3 with four rows, 4e4 or more with three
+)
 MAX_ONWARD_COSINE = np.cos(np.radians(150.0))  # between the two edges at a marker that form one gridline
 
 
@@ -32,15 +35,15 @@ class Topology(NamedTuple):
         ring_vectors: (M, 18, 2) float64, the layout vectors from a marker to its ``ring_markers``, in units of the
             mean edge, y up.
         derivative_stencil: (M, 5, 18) float64, weights of the differences to the ``ring_markers`` that give the
-            map's derivatives x, y, xx, xy, yy (least squares of a cubic) where all 18 exist; else 0.
+            map's derivatives x, y, xx, xy, yy: least squares of a cubic where the markers determine one, else of a
+            quadratic as in ``regularised_maps``; 0 where these are too few.
         edge_vectors: (E, 2) float64, from an edge's start to its end, in the unit of ``ring_vectors``.
         next_markers: (E, 2) int32, on the same gridline the marker before an edge's start and the one after its end.
         third_differences: (E, 2) float64, the layout's third difference along these four markers, in the unit of
             ``ring_vectors``.
         next_edges: (M, 6) int32, the edge that follows each of the ``spokes`` on the same gridline.
-        end_couplings: (E, 3) float64, how a gridline moves with its start, with its end, and (mean of both) with the
-            other end, relative to a straight line between the two: through the map, a marker that moves alone bends
-            the gridlines around it.
+        end_couplings: (E, 6) float64, see ``gridline_slopes``.
+        scatter_bending: (E, 3) float64, see ``gridline_slopes``.
     """
 
     edges: NDArray[np.int32]
@@ -58,6 +61,7 @@ class Topology(NamedTuple):
     third_differences: NDArray[np.float64]
     next_edges: NDArray[np.int32]
     end_couplings: NDArray[np.float64]
+    scatter_bending: NDArray[np.float64]
 
 
 def topology_of(layout: Reference) -> Topology:
@@ -84,6 +88,7 @@ def topology_of(layout: Reference) -> Topology:
     )
     stencil = _derivative_stencil(ring_markers, ring_vectors)
     edge_vectors = chord / length.mean()
+    slopes = slope_weights(stencil, ring_markers, edges, edge_vectors)
     return Topology(
         edges=layout.edges.astype(np.int32),
         cells=cells.astype(np.int32),
@@ -99,7 +104,8 @@ def topology_of(layout: Reference) -> Topology:
         next_markers=next_markers,
         third_differences=np.where(np.all(next_markers >= 0, axis=1)[:, None], third / length.mean(), 0.0),
         next_edges=_next_edges(spokes, edges, next_markers, key),
-        end_couplings=_end_couplings(stencil, ring_markers, edges, edge_vectors),
+        end_couplings=end_couplings(slopes, edges),
+        scatter_bending=scatter_bending(slopes, edges, edge_vectors)[edges].mean(axis=1),
     )
 
 
@@ -180,18 +186,22 @@ def _derivative_stencil(
 ) -> NDArray[np.float64]:
     """(M, 5, 18) float64, see ``Topology.derivative_stencil``."""
     known = ring_markers >= 0
-    full = known.all(axis=1)
     x, y = ring_vectors[..., 0], ring_vectors[..., 1]
     quadratic = np.stack([x, y, x * x / 2, x * y, y * y / 2], axis=2)
-    cubic = np.concatenate([quadratic, np.stack([x * x * x, x * x * y, x * y * y, y * y * y], axis=2)], axis=2)
+    cubic = np.concatenate(
+        [quadratic, np.stack([x * x * x, x * x * y, x * y * y, y * y * y], axis=2)], axis=2
+    )
     out = np.zeros((len(ring_markers), MAP_DERIVATIVES, MAX_RING_MARKERS))
     with np.errstate(divide="ignore"):
         near = np.where(known, (x * x + y * y) ** -2.0, 0.0)
-    enough = ~full & (known.sum(axis=1) >= MAP_LIMITS.min_firm_neighbours)
+    enough = np.flatnonzero(known.sum(axis=1) >= MAP_LIMITS.min_firm_neighbours)
     ridge = np.array([0.0, 0.0, *[MAP_LIMITS.firm_ridge] * 3])
-    for chosen, terms, weight, added in ((full, cubic, known * 1.0, 0.0), (enough, quadratic, near, ridge)):
-        solutions, regular = _least_squares(terms[chosen], weight[chosen], added)
-        out[np.flatnonzero(chosen)[regular]] = solutions[regular, :MAP_DERIVATIVES]
+    every = known * 1.0
+    first, second = slice(0, 2), slice(2, MAP_DERIVATIVES)
+    fits = (quadratic, near, ridge, first), (cubic, every, 0.0, first), (quadratic, every, ridge, second)
+    for terms, weight, added, rows in fits:
+        solutions, regular = _least_squares(terms[enough], weight[enough], added)
+        out[enough[regular], rows] = solutions[regular, rows]
     return out
 
 
@@ -209,35 +219,3 @@ def _least_squares(
     solutions = np.zeros(weighted.shape)
     solutions[regular] = np.linalg.solve(gram[regular], weighted[regular])
     return solutions, regular
-
-
-def _end_couplings(
-    stencil: NDArray[np.float64],
-    ring_markers: NDArray[np.int32],
-    edges: NDArray[np.int64],
-    edge_vectors: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """(E, 3) float64, see ``Topology.end_couplings``.
-
-    The offset of a gridline from its chord, t (1 - t) (l (1 - t) - a t), with the slopes l at its start and a at its end
-    in units of its length, is as a straight line (4 l - a) / 30 at its start and (l - 4 a) / 30 at its end.
-    """
-    moved = np.empty((len(edges), 2, 2))  # of the straight line's two ends, by the edge's two ends
-    slope = np.empty((2, len(edges), 2))  # at the two ends, by the two ends
-    for at in (0, 1):
-        marker, other = edges[:, at], edges[:, 1 - at]
-        weights = np.einsum("ed,edk->ek", edge_vectors, stencil[marker, :2])
-        of_other = np.where(ring_markers[marker] == other[:, None], weights, 0.0).sum(axis=1)
-        chord = np.array([-1.0, 1.0])
-        slope[at, :, at] = -weights.sum(axis=1) - chord[at]
-        slope[at, :, 1 - at] = of_other - chord[1 - at]
-    leave, arrive = slope
-    for by in (0, 1):
-        moved[:, 0, by] = (by == 0) + (4.0 * leave[:, by] - arrive[:, by]) / 30.0
-        moved[:, 1, by] = (by == 1) + (leave[:, by] - 4.0 * arrive[:, by]) / 30.0
-    # the squared distance of a straight line from another, over its length, by its ends
-    sums = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
-    product = sums @ moved
-    return np.stack(
-        [3.0 * product[:, 0, 0], 3.0 * product[:, 1, 1], 3.0 * (product[:, 0, 1] + product[:, 1, 0])], axis=1
-    )

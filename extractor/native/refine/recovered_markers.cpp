@@ -76,7 +76,6 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
   const Array<double, 2> bend = selected_rows(state.bend, numbers);
   const Array<double, 2> sides = selected_rows(contrasts.sides, numbers);
   const Array<double, 2> across = selected_rows(contrasts.contrasts, numbers);
-  const Array<double, 2> couplings = selected_rows(topology.end_couplings, numbers);
   const Array<double, 2> clearance = selected_rows(contrasts.clearance, numbers);
   Array<double, 2> lines =
       gridlines(state.xy, state.maps, bend, ends, selected_rows(topology.edge_vectors, numbers),
@@ -88,8 +87,9 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
   update_without_dot_gain(sums, gradients, across, selected_rows(topology.edge_cells, numbers),
                           state.dot_gain);
   const Array<double, 1> weight = selected_items(state.weight, numbers);
+  const Array<double, 2> by_scatter = selected_rows(topology.scatter_bending, numbers);
   EliminatedBending bent =
-      update_for_bending(sums, gradients, {bend, state.roughness, weight, state.scatter.variance}, lines,
+      update_for_bending(sums, gradients, {bend, state.roughness, weight, state.scatter, by_scatter}, lines,
                          ends, state.noise, limits.profiles.rule, limits.profiles.step);
   Array<double, 1> profile_weight = profile_weights(sums, gradients, clearance, read.count, limits);
   return {std::move(lines), std::move(sums), std::move(gradients), std::move(profile_weight),

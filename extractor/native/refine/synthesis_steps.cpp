@@ -20,8 +20,8 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   Array<double, 1> dot_gain_offset =
       update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
   EliminatedBending bent = update_for_bending(
-      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter.variance}, lines, edges,
-      state.noise, rule, limits.step);
+      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
+      lines, edges, state.noise, rule, limits.step);
   const Array<double, 1> pardon = bending_misfit(bent.variance, contrasts, sigma, limits.step.bending);
   GridlineWeights weighed =
       weigh_gridlines(sums, gradients, pardon, static_cast<double>(rule.values),

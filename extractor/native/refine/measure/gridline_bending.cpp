@@ -168,7 +168,6 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
       known[m] += weight;
     }
   }
-  const double by_scatter = limits.bend_by_scatter * prior.scatter_variance;
   const double least = squared(limits.min_bend_share), most = squared(limits.max_bend_share);
   for (Index e = 0; e < edges.size(); ++e) {
     const std::int32_t i = edges(e, 0), j = edges(e, 1);
@@ -177,6 +176,7 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
     const double noise = (noise_total[i] + noise_total[j]) / both;
     const double excess =
         (total[i] + total[j]) / both - noise * (1.0 + limits.min_significance * std::sqrt(2.0 / both));
+    const double by_scatter = prior.scatter.bend_variance(prior.scatter_bending[e]);
     const double limit = std::min(most * square, squared(limits.max_bend_deviation * lines(e, LENGTH)));
     out[e] = std::min(std::max({excess, least * square, by_scatter}), limit);
   }

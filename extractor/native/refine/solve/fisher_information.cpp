@@ -11,7 +11,14 @@ namespace cmp::refine {
 
 namespace {
 
-constexpr Index BETWEEN = 2;  // of a gridline's couplings: its two ends with each other
+constexpr Index COUPLINGS = 3,
+                BETWEEN = 2;  // of a gridline: by start, by end, and of the two with each other
+
+// One of gridline e's couplings, by tangents and second derivatives as the scatter has it.
+double coupling(const GridlineSystem& system, Index e, Index which) {
+  const double share = system.scatter_share;
+  return (1.0 - share) * system.couplings(e, which) + share * system.couplings(e, COUPLINGS + which);
+}
 
 // Writes the product of the matrix and a vector (M, 2) into out (M, 2).
 void fill_product(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
@@ -92,21 +99,18 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     diagonal(m, 0) = diagonal(m, 2) = prior[m];
     diagonal(m, 1) = 0.0;
   }
-  const double smooth = 1.0 - system.scatter_share;
   for (Index e = 0; e < edges.size(); ++e) {
     const double w = system.weight[e] * lines(e, KNOWN) / system.variance;
     if (w == 0.0) continue;
     const double nx = -lines(e, UY), ny = lines(e, UX);
     for (Index side = 0; side < 2; ++side) {
       const Index m = edges(e, side);
-      const double own = 1.0 + smooth * (system.couplings(e, side) - 1.0);
-      const double value = w * own * (side == 0 ? sums(e, AA) : sums(e, BB));
+      const double value = w * coupling(system, e, side) * (side == 0 ? sums(e, AA) : sums(e, BB));
       diagonal(m, 0) += value * nx * nx;
       diagonal(m, 1) += value * nx * ny;
       diagonal(m, 2) += value * ny * ny;
     }
-    const double between = 1.0 + smooth * (system.couplings(e, BETWEEN) - 1.0);
-    const double value = w * between * sums(e, AB);
+    const double value = w * coupling(system, e, BETWEEN) * sums(e, AB);
     off_diagonal(e, 0) += value * nx * nx;
     off_diagonal(e, 1) += value * nx * ny;
     off_diagonal(e, 2) += value * ny * nx;

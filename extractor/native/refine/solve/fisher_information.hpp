@@ -30,7 +30,7 @@ struct GridlineSystem {
   View<const double, 1> weight;        // (E,) 0 to 1; a gridline that is not drawn counts as 0
   View<const double, 2> lines;         // (E, 8), as gridlines gives them
   View<const double, 2> contrasts;     // (E, 3) gray levels
-  View<const double, 2> couplings;     // (E, 3), the topology's end_couplings
+  View<const double, 2> couplings;     // (E, 6), the topology's end_couplings
   View<const std::int32_t, 2> edges;   // (E, 2) the markers at the gridlines' ends
   View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
   double sigma;                        // the blur, px
