@@ -28,6 +28,7 @@ struct WeighedProfiles {
   ShiftGradients gradients;        // likewise
   Array<double, 1> weight;         // (n,) 0 to 1, how well each gridline looks like the pattern
   Array<double, 1> bend_variance;  // (n,) px^2
+  Array<double, 2> bend_response;  // (n, 7), as update_without_bending gives it
 };
 
 // The items of a list with these numbers (n,).
@@ -92,8 +93,8 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
       update_for_bending(sums, gradients, {bend, state.roughness, weight, state.scatter, by_scatter}, lines,
                          ends, state.noise, limits.profiles.rule, limits.profiles.step);
   Array<double, 1> profile_weight = profile_weights(sums, gradients, clearance, read.count, limits);
-  return {std::move(lines), std::move(sums), std::move(gradients), std::move(profile_weight),
-          std::move(bent.variance)};
+  return {std::move(lines),          std::move(sums),          std::move(gradients),
+          std::move(profile_weight), std::move(bent.variance), std::move(bent.response)};
 }
 
 // (m,) 1/px^2, the information about the markers of the subproblem; those known and not hidden are held.
@@ -141,7 +142,8 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
   if (std::find(asked.begin(), asked.end(), true) == asked.end()) return;
   const Array<double, 1> prior = held_information(state.hidden, markers.xy, own.markers, step);
   const Array<double, 2> across = selected_rows(contrasts.contrasts, numbers);
-  const Array<double, 2> couplings = selected_rows(topology.end_couplings, numbers);
+  const Array<double, 2> couplings =
+      end_couplings(selected_rows(topology.end_couplings, numbers), state.scatter.share, read.bend_response);
   const GridlineSystem system{read.sums.slice(0, count),
                               weight,
                               read.lines.slice(0, count),
@@ -150,8 +152,7 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
                               own.ends,
                               own.spokes,
                               state.sigma,
-                              state.noise * state.noise,
-                              state.scatter.share};
+                              state.noise * state.noise};
   const InformationArrays information = fisher_information(system, prior, false, step.information);
   const Array<double, 2> measured = shifted_markers(
       system, information, read.gradients.start.slice(0, count), read.gradients.end.slice(0, count),

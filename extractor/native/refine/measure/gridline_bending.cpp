@@ -186,11 +186,12 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
 Array<double, 2> update_without_bending(View<double, 2> sums, ShiftGradients& gradients,
                                         View<const double, 2> bend, View<const double, 1> bend_variance,
                                         double variance) {
-  Array<double, 2> response({sums.size(), 6}, 0.0);
+  Array<double, 2> response({sums.size(), RESPONSE_COLUMNS}, 0.0);
   for (Index e = 0; e < sums.size(); ++e) {
     const auto own = sums[e], out = response[e];
     own[READ_AA] = own[AA];
     own[READ_BB] = own[BB];
+    out[HELD] = 1.0;
     if (own[AA] == 0.0) continue;
     const double c = own[C], d = own[D], ac = own[AC], ad = own[AD], bc = own[BC], bd = own[BD];
     double x = -bend(e, 0), y = -bend(e, 1);
@@ -205,6 +206,7 @@ Array<double, 2> update_without_bending(View<double, 2> sums, ShiftGradients& gr
       out[3] = (cc * ad - cd * ac) * inverse;
       out[4] = (dd * bc - cd * bd) * inverse;
       out[5] = (cc * bd - cd * bc) * inverse;
+      out[HELD] = stiff / cc;
     }
     out[0] = x;
     out[1] = y;

@@ -58,6 +58,8 @@ struct BendingPrior {
   View<const double, 2> scatter_bending;  // (E, 3), the topology's
 };
 
+inline constexpr Index HELD = 6, RESPONSE_COLUMNS = 7;  // of update_without_bending
+
 struct ThirdDifference {
   double x, y;  // px
 };
@@ -103,8 +105,8 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
 // Eliminates the bending from the gridlines' sums (E, 24) and the gradients.
 //
 // bend (E, 2) px, b and s as drawn; bend_variance (E,) px^2; variance of the noise, gray levels^2.
-// (E, 6): px, the change of b and s with both ends held; px/px, its decrease by a shift of the start, then by
-// a shift of the end, along the normal.
+// (E, 7): px, the change of b and s with both ends held; px/px, its decrease by a shift of the start, then by
+// a shift of the end, along the normal; 0 to 1, how far b is held where the map puts it.
 Array<double, 2> update_without_bending(View<double, 2> sums, ShiftGradients& gradients,
                                         View<const double, 2> bend, View<const double, 1> bend_variance,
                                         double variance);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "refine/measure/gridline_bending.hpp"
 #include "refine/solve/ring_elimination.hpp"
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/residual_kernel.hpp"
@@ -11,14 +12,7 @@ namespace cmp::refine {
 
 namespace {
 
-constexpr Index COUPLINGS = 3,
-                BETWEEN = 2;  // of a gridline: by start, by end, and of the two with each other
-
-// One of gridline e's couplings, by tangents and second derivatives as the scatter has it.
-double coupling(const GridlineSystem& system, Index e, Index which) {
-  const double share = system.scatter_share;
-  return (1.0 - share) * system.couplings(e, which) + share * system.couplings(e, COUPLINGS + which);
-}
+constexpr Index COUPLINGS = 3, BETWEEN = 2;  // of a gridline: start, end, and the two with each other
 
 // Writes the product of the matrix and a vector (M, 2) into out (M, 2).
 void fill_product(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
@@ -88,6 +82,20 @@ Array<std::int64_t, 1> known_markers(View<const double, 2> diagonal, double min_
 
 }  // namespace
 
+Array<double, 2> end_couplings(View<const double, 2> of_topology, double scatter_share,
+                               View<const double, 2> bend_response) {
+  Array<double, 2> out({of_topology.size(), COUPLINGS});
+  const auto couplings = out.view();
+  for (Index e = 0; e < couplings.size(); ++e) {
+    for (Index k = 0; k < COUPLINGS; ++k) {
+      const double by_tangents = of_topology(e, k), by_curves = of_topology(e, COUPLINGS + k);
+      const double held = by_tangents + scatter_share * (by_curves - by_tangents);
+      couplings(e, k) = 1.0 + bend_response(e, HELD) * (held - 1.0);
+    }
+  }
+  return out;
+}
+
 InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
                                      bool overlapping, const InformationLimits& limits) {
   const auto sums = system.sums, lines = system.lines;
@@ -105,12 +113,12 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     const double nx = -lines(e, UY), ny = lines(e, UX);
     for (Index side = 0; side < 2; ++side) {
       const Index m = edges(e, side);
-      const double value = w * coupling(system, e, side) * (side == 0 ? sums(e, AA) : sums(e, BB));
+      const double value = w * system.couplings(e, side) * (side == 0 ? sums(e, AA) : sums(e, BB));
       diagonal(m, 0) += value * nx * nx;
       diagonal(m, 1) += value * nx * ny;
       diagonal(m, 2) += value * ny * ny;
     }
-    const double value = w * coupling(system, e, BETWEEN) * sums(e, AB);
+    const double value = w * system.couplings(e, BETWEEN) * sums(e, AB);
     off_diagonal(e, 0) += value * nx * nx;
     off_diagonal(e, 1) += value * nx * ny;
     off_diagonal(e, 2) += value * ny * nx;

@@ -30,12 +30,11 @@ struct GridlineSystem {
   View<const double, 1> weight;        // (E,) 0 to 1; a gridline that is not drawn counts as 0
   View<const double, 2> lines;         // (E, 8), as gridlines gives them
   View<const double, 2> contrasts;     // (E, 3) gray levels
-  View<const double, 2> couplings;     // (E, 6), the topology's end_couplings
+  View<const double, 2> couplings;     // (E, 3), as end_couplings gives them
   View<const std::int32_t, 2> edges;   // (E, 2) the markers at the gridlines' ends
   View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
   double sigma;                        // the blur, px
   double variance;                     // of the noise, squared gray levels, one channel
-  double scatter_share;                // 0 to 1, as in MarkerScatter
 };
 
 // Limits of the information; explained in extractor/refine/solve/fisher_information.py.
@@ -50,6 +49,13 @@ struct InformationLimits {
     return {f["held_information"], f["max_steps"], f["precision"], f["min_determinant"], f["shared"]};
   }
 };
+
+// (E, 3) how gridlines move with their start, their end and the other end, relative to straight lines.
+//
+// of_topology (E, 6); scatter_share, 0 to 1, as in MarkerScatter; bend_response (E, 7), as
+// update_without_bending gives it: a gridline that is free to bend stays where the image shows it.
+Array<double, 2> end_couplings(View<const double, 2> of_topology, double scatter_share,
+                               View<const double, 2> bend_response);
 
 // The information about the markers.
 //

@@ -12,7 +12,7 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 // Writes the map (2, 5) at marker m; NaN where a neighbour is unknown. near (K,), stencil (5, K).
 void fill_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
-                            View<const double, 2> stencil, View<double, 2> out) {
+                      View<const double, 2> stencil, View<double, 2> out) {
   std::array<double, DERIVATIVES> to_x{}, to_y{};
   for (Index k = 0; k < near.size(); ++k) {
     const Index n = near[k];
