@@ -1,14 +1,15 @@
 """How the slopes of gridlines depend on the markers of a layout, and what follows for their ends and their bending.
 
-A gridline is the cubic between two markers with slopes against its chord (``gridlines``), which come from the maps at its
-ends, and the maps come from the markers around: a marker that moves alone bends the gridlines around it. At the rim,
-where markers lie on one side only, it bends them otherwise than inside. All of that is linear in the markers:
+A gridline is the cubic between two markers with slopes against its chord (``gridlines``). The slopes come from the maps
+at its ends, and the maps from the markers around. A marker that moves alone therefore bends the gridlines around it, at
+the rim otherwise than inside, because the rim's markers have neighbours on one side only. The slopes are linear in the
+markers:
 
-    tangents: l = d_a - c, a = d_b - c
-    second derivatives: l = -(2 k_a + k_b) / 6, a = (k_a + 2 k_b) / 6
+    by tangents: l = d_a - c, a = d_b - c
+    by second derivatives: l = -(2 k_a + k_b) / 6, a = (k_a + 2 k_b) / 6
 
-with the slopes l at the start and a at the end times the gridline's length, the map's first and second derivatives d and
-k along the edge at its two ends, and the chord c, the end's offset less the start's.
+l and a: the slopes at the start and at the end times the gridline's length. d and k: the map's first and second
+derivatives along the edge, at its start (a) and end (b). c: the offset of the end less that of the start.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import layout as native
+
 CHORD = np.array([-1.0, 1.0])  # of the offsets of a gridline's start and end
-PARTS = (0, 0), (0, 1), (1, 1)  # of a symmetric matrix
 SIDE_SUMS = (
     np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 )  # of products of straight lines along a gridline, by their ends
@@ -95,49 +97,26 @@ def end_couplings(slopes: SlopeWeights, edges: NDArray[np.int64]) -> NDArray[np.
 
 
 def scatter_bending(
-    slopes: SlopeWeights, edges: NDArray[np.int64], edge_vectors: NDArray[np.float64]
+    slopes: SlopeWeights,
+    edges: NDArray[np.int64],
+    edge_vectors: NDArray[np.float64],
+    spokes: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """How independent scatter of the markers bends the gridlines at each, where cells keep straight sides.
+    """How independent scatter of the markers bends the gridlines, where cells keep straight sides.
 
-    The gridlines at a marker bend together, because their slopes come from the same markers. The variance is that of
-    bending which moves the marker as much, but bends each gridline by itself.
+    The b (``gridline_bending``) of a gridline is half of the difference of its slopes. The gridlines at a marker bend
+    together, because their slopes come from the same markers, and move the marker by the b that suits all of them best.
+    The variance is that of gridlines which bend each by itself and move it as much.
 
     Returns:
-        (M, 3) float64, over the variance of the scatter: the variance of the gridlines' b (``gridline_bending``), half of
-        the difference of the slopes, by tangents; its covariance with that by second derivatives; the variance of the
-        latter.
+        (E, 3) float64, over the variance of the scatter: the variance of b by tangents, its covariance with the b by
+        second derivatives, and the variance of the latter; means of both ends.
     """
-    count = int(edges.max()) + 1
     normals = np.stack([-edge_vectors[:, 1], edge_vectors[:, 0]], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    across = normals[:, :, None] * normals[:, None, :]  # the bending by a marker's shift, as a shift of the end
-    entries, item = np.unique(
-        (edges[:, :, None] * count + slopes.ids[:, None]).ravel(), return_inverse=True
-    )
-    total = np.stack([np.bincount(edges.ravel(), np.repeat(across[:, i, j], 2)) for i, j in PARTS], axis=1)
-    moved = [
-        [
-            np.bincount(item, np.repeat(b[:, None] * across[:, i, j, None, None], 2, axis=1).ravel())
-            for i, j in PARTS
-        ]
-        for b in 0.5 * (slopes.leave - slopes.arrive)
-    ]
-    # shift = (sum of n n)^-1 (sum of n n b)
-    determinant = total[:, 0] * total[:, 2] - total[:, 1] ** 2
-    owner = entries // count
-    xx, xy, yy = (total[owner, k] / determinant[owner] for k in range(3))
-    shifts = [
-        (yy * p - xy * q, yy * q - xy * r, xx * q - xy * p, xx * r - xy * q) for p, q, r in moved
-    ]
-    gridlines = total[:, 0] + total[:, 2]
-    return np.stack(
-        [
-            np.bincount(owner, sum(u * v for u, v in zip(shifts[one], shifts[other], strict=True))) / 2.0
-            * gridlines / 2.0
-            for one, other in ((0, 0), (0, 1), (1, 1))
-        ],
-        axis=1,
-    )
+    weights = 0.5 * (slopes.leave - slopes.arrive)
+    at_markers: NDArray[np.float64] = native.scatter_bending(slopes.ids, weights, normals, spokes)
+    return np.asarray(at_markers[edges].mean(axis=1))
 
 
 def _with_own(weights: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -105,7 +105,7 @@ def topology_of(layout: Reference) -> Topology:
         third_differences=np.where(np.all(next_markers >= 0, axis=1)[:, None], third / length.mean(), 0.0),
         next_edges=_next_edges(spokes, edges, next_markers, key),
         end_couplings=end_couplings(slopes, edges),
-        scatter_bending=scatter_bending(slopes, edges, edge_vectors)[edges].mean(axis=1),
+        scatter_bending=scatter_bending(slopes, edges, edge_vectors, spokes),
     )
 
 
@@ -215,7 +215,8 @@ def _least_squares(
     """
     weighted = np.swapaxes(terms * weight[..., None], 1, 2)
     gram = weighted @ terms + ridge * np.eye(terms.shape[2])
-    regular = np.linalg.cond(gram) < MAX_CONDITION if len(gram) else np.empty(0, np.bool_)
+    eigenvalues = np.linalg.eigvalsh(gram)
+    regular = eigenvalues[:, -1] < MAX_CONDITION * eigenvalues[:, 0]
     solutions = np.zeros(weighted.shape)
     solutions[regular] = np.linalg.solve(gram[regular], weighted[regular])
     return solutions, regular

@@ -142,13 +142,13 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
   if (std::find(asked.begin(), asked.end(), true) == asked.end()) return;
   const Array<double, 1> prior = held_information(state.hidden, markers.xy, own.markers, step);
   const Array<double, 2> across = selected_rows(contrasts.contrasts, numbers);
-  const Array<double, 2> couplings =
-      end_couplings(selected_rows(topology.end_couplings, numbers), state.scatter.share, read.bend_response);
+  const Array<double, 2> curved =
+      curving(selected_rows(topology.end_couplings, numbers), state.scatter.share, read.bend_response);
   const GridlineSystem system{read.sums.slice(0, count),
                               weight,
                               read.lines.slice(0, count),
                               across,
-                              couplings,
+                              curved,
                               own.ends,
                               own.spokes,
                               state.sigma,

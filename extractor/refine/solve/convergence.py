@@ -21,11 +21,13 @@ class ConvergenceLimits(NamedTuple):
     Attributes:
         remaining_share: of a step, per blur, that another step would still correct.
         max_remaining_share: of a step, at most.
+        max_shrinking: of a marker's last step over the one before, at most; by it the steps that would follow shrink.
         mean_over_median: of squares, by which the median of the squared shifts becomes their mean.
     """
 
     remaining_share: float = 1.0
     max_remaining_share: float = 0.5
+    max_shrinking: float = 0.9
     mean_over_median: float = 1.44
 
 
@@ -52,19 +54,23 @@ def typical_move(shift: NDArray[np.float64], information: Information) -> float:
 
 
 def convergence_covariance(
-    shift: NDArray[np.float64], sigma: float, remaining_share: float
+    shift: NDArray[np.float64], last: NDArray[np.float64], sigma: float, remaining_share: float
 ) -> NDArray[np.float64]:
     """The covariance of the error that the last step left.
 
-    The drawing responds less than linearly to shifts of the size of the blur.
+    The drawing responds less than linearly to shifts of the size of the blur. A marker whose steps shrink slowly is as
+    far from its place as the steps that would follow (a geometric series).
 
     Args:
         shift: (M, 2) px, the last step.
+        last: (M, 2) px, the step before, NaN where there was none.
         sigma: the blur, px.
         remaining_share: share of a usual step that is left in any case.
 
     Returns:
         (M, 2, 2) px^2.
     """
-    covariance: NDArray[np.float64] = native.convergence_covariance(shift, sigma, remaining_share, LIMITS)
+    covariance: NDArray[np.float64] = native.convergence_covariance(
+        shift, last, sigma, remaining_share, LIMITS
+    )
     return covariance

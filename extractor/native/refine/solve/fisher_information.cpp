@@ -82,15 +82,14 @@ Array<std::int64_t, 1> known_markers(View<const double, 2> diagonal, double min_
 
 }  // namespace
 
-Array<double, 2> end_couplings(View<const double, 2> of_topology, double scatter_share,
-                               View<const double, 2> bend_response) {
-  Array<double, 2> out({of_topology.size(), COUPLINGS});
-  const auto couplings = out.view();
+Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
+                         View<const double, 2> bend_response) {
+  Array<double, 2> out({couplings.size(), COUPLINGS});
   for (Index e = 0; e < couplings.size(); ++e) {
     for (Index k = 0; k < COUPLINGS; ++k) {
-      const double by_tangents = of_topology(e, k), by_curves = of_topology(e, COUPLINGS + k);
-      const double held = by_tangents + scatter_share * (by_curves - by_tangents);
-      couplings(e, k) = 1.0 + bend_response(e, HELD) * (held - 1.0);
+      const double by_tangents = couplings(e, k), by_curves = couplings(e, COUPLINGS + k);
+      const double coupling = by_tangents + scatter_share * (by_curves - by_tangents);
+      out(e, k) = bend_response(e, HELD) * (coupling - 1.0);
     }
   }
   return out;
@@ -113,12 +112,15 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     const double nx = -lines(e, UY), ny = lines(e, UX);
     for (Index side = 0; side < 2; ++side) {
       const Index m = edges(e, side);
-      const double value = w * system.couplings(e, side) * (side == 0 ? sums(e, AA) : sums(e, BB));
+      const double left = side == 0 ? sums(e, AA) : sums(e, BB);
+      const double value = w * (left + system.curving(e, side) * sums(e, side == 0 ? READ_AA : READ_BB));
       diagonal(m, 0) += value * nx * nx;
       diagonal(m, 1) += value * nx * ny;
       diagonal(m, 2) += value * ny * ny;
     }
-    const double value = w * system.couplings(e, BETWEEN) * sums(e, AB);
+    // both ends together: half of what either end has
+    const double read = 0.25 * (sums(e, READ_AA) + sums(e, READ_BB));
+    const double value = w * (sums(e, AB) + system.curving(e, BETWEEN) * read);
     off_diagonal(e, 0) += value * nx * nx;
     off_diagonal(e, 1) += value * nx * ny;
     off_diagonal(e, 2) += value * ny * nx;

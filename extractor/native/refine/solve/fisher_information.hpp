@@ -30,7 +30,7 @@ struct GridlineSystem {
   View<const double, 1> weight;        // (E,) 0 to 1; a gridline that is not drawn counts as 0
   View<const double, 2> lines;         // (E, 8), as gridlines gives them
   View<const double, 2> contrasts;     // (E, 3) gray levels
-  View<const double, 2> couplings;     // (E, 3), as end_couplings gives them
+  View<const double, 2> curving;       // (E, 3), as curving gives it
   View<const std::int32_t, 2> edges;   // (E, 2) the markers at the gridlines' ends
   View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
   double sigma;                        // the blur, px
@@ -50,12 +50,13 @@ struct InformationLimits {
   }
 };
 
-// (E, 3) how gridlines move with their start, their end and the other end, relative to straight lines.
+// (E, 3) how much more than straight lines the gridlines move with their start, with their end, and with the
+// other end.
 //
-// of_topology (E, 6); scatter_share, 0 to 1, as in MarkerScatter; bend_response (E, 7), as
-// update_without_bending gives it: a gridline that is free to bend stays where the image shows it.
-Array<double, 2> end_couplings(View<const double, 2> of_topology, double scatter_share,
-                               View<const double, 2> bend_response);
+// couplings (E, 6), the topology's end_couplings; scatter_share, 0 to 1, as in MarkerScatter; bend_response
+// (E, 7), as update_without_bending gives it: a gridline that is free to bend stays where the image shows it.
+Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
+                         View<const double, 2> bend_response);
 
 // The information about the markers.
 //
