@@ -1,4 +1,5 @@
-"""Libraries that may be missing: each belongs to an extra; a missing one is one line with the command that helps.
+"""Libraries that may be missing. Each library belongs to an extra; a missing library gives one line with the install
+command.
 
 Modules import such a library where they first use it, within ``with extra("laser"):``.
 """
@@ -17,7 +18,7 @@ from urllib.request import url2pathname
 
 from cmpdesign.errors import CmpDesignError
 
-# Extras by what they are for; pyproject.toml names their libraries.
+# Extras and their purposes; pyproject.toml names the libraries.
 EXTRAS = {
     "laser": "laser jobs and kerf coupons",
     "cad": "molds, STEP files, meshes",
@@ -26,7 +27,7 @@ EXTRAS = {
     "parquet": "tables as Parquet",
     "recording": "recordings for ROS 2 and Foxglove",
     "export": "data sets for LeRobot and Diffusion Policy",
-    "live": "frames sent to Foxglove while they are read",
+    "live": "frames shown in Foxglove during a run",
     "rerun": "recordings and a live view for Rerun",
     "data": "data sets for training",
     "dask": "data sets made by several machines",
@@ -51,7 +52,7 @@ class extra:
 
     Args:
         name: the extra that brings the libraries, of ``EXTRAS``.
-        instead: what can be done without the libraries, as "write .csv".
+        instead: remedy without the libraries, as "write .csv".
     """
 
     __slots__ = ("_instead", "_name")
@@ -76,10 +77,10 @@ class extra:
 
 
 def require_libraries(name: str, *modules: str, instead: str = "") -> None:
-    """Look for modules of an extra before work that would stop where the first one is missing.
+    """Check that the modules of an extra are installed, before work that needs them.
 
     Raises:
-        MissingLibraryError: one is not installed.
+        MissingLibraryError: a module is not installed.
     """
     with extra(name, instead):
         for module in modules:
@@ -88,7 +89,7 @@ def require_libraries(name: str, *modules: str, instead: str = "") -> None:
 
 
 def install_command(name: str) -> str:
-    """The command that installs an extra, from where this package itself was installed."""
+    """The command that installs an extra, from the source of this package's own installation."""
     source, options = _installed_from()
     wanted = f"{source}[{name}]"
     quoted = f'"{wanted}"' if sys.platform == "win32" else shlex.quote(wanted)
@@ -98,7 +99,7 @@ def install_command(name: str) -> str:
 def missing_library_text(error: ModuleNotFoundError) -> str | None:
     """One sentence with the remedy, for a library that every installation has.
 
-    None for a module that no requirement brings, which is a fault of the program.
+    None for a module that no requirement contains, which is a fault of the program.
     """
     module = _top_module(error)
     if module is None or module in _OWN or module in sys.stdlib_module_names:
@@ -115,7 +116,7 @@ def _top_module(error: ModuleNotFoundError) -> str | None:
 
 
 def _base_requirement(name: str) -> str | None:
-    """What to give to pip for a distribution that is required without an extra."""
+    """The argument of pip for a distribution that is required without an extra."""
     try:
         lines = requires("cmpdesign") or []
     except PackageNotFoundError:  # run from a copy of the sources

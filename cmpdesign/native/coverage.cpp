@@ -161,7 +161,7 @@ Array<float, 3> apply_point_spread(View<const float, 3> differences, const Sprea
   return image;
 }
 
-// Pixel rows first to first + count as (planes, count, width).
+// Pixel rows `first` to `first + count` as (planes, count, width).
 Array<float, 3> draw_band(const CoverageTask& task, Index first, Index count) {
   const Index rows = task.spread.oversampling * (count - 1) + 2 * task.spread.reach + 1;
   Array<float, 3> differences({task.values.size(1), rows, task.columns}, 0.0F);

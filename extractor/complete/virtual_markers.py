@@ -24,8 +24,8 @@ class VirtualLimits(NamedTuple):
     """Limits of virtual markers.
 
     Attributes:
-        max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt.
-        bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord.
+        max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt. Chosen.
+        bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord. Chosen.
     """
 
     max_measured_offset: float = 0.08
@@ -75,7 +75,7 @@ def locate_virtual_markers(
 
     Args:
         points: (E, m, 3) float64, measured x and y (px) and their variance across the gridline (px^2), NaN for none.
-        scatter: of the markers; with some, the gridlines curve as the map's second derivatives say.
+        scatter: of the markers; with scatter, the gridlines curve by the map's second derivatives.
     """
     if points.shape[1] == 0:
         return VirtualMarkers(

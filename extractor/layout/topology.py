@@ -1,4 +1,4 @@
-"""The topology of a layout: which edges, cells and neighbours belong to each other. Refinement uses these tables."""
+"""The topology of a layout: the relations of edges, cells and neighbours. Refinement uses these tables."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Topology(NamedTuple):
             map's derivatives x, y, xx, xy, yy: least squares of a cubic where the markers determine one, else of a
             quadratic as in ``regularised_maps``; 0 where these are too few.
         edge_vectors: (E, 2) float64, from an edge's start to its end, in the unit of ``ring_vectors``.
-        next_markers: (E, 2) int32, on the same gridline the marker before an edge's start and the one after its end.
+        next_markers: (E, 2) int32, on the same gridline the marker before an edge's start and the marker after its end.
         third_differences: (E, 2) float64, the layout's third difference along these four markers, in the unit of
             ``ring_vectors``.
         next_edges: (M, 6) int32, the edge that follows each of the ``spokes`` on the same gridline.

@@ -1,4 +1,4 @@
-"""The rules of the numbering, and of the cells that stand apart."""
+"""The rules of the numbering, and of detached cells."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NUMBERING = (
     ),
     Rule(
         "relative whiteness",
-        "places less white than the whitest are no white cells",
+        "places less white than the whitest place are no white cells",
         "no wrong id",
         "extractor/numbering/lattice_walk.py",
         "found = [one for one in found if one.white >= white]",
@@ -31,7 +31,7 @@ NUMBERING = (
     ),
     Rule(
         "white beside",
-        "a white cell that touches walked cells goes before a farther one",
+        "a white cell that touches walked cells has priority over a farther white cell",
         "no wrong id",
         "extractor/numbering/lattice_walk.py",
         "key=lambda one: (one.white_adjacent, one.score)",
@@ -63,7 +63,7 @@ NUMBERING = (
     ),
     Rule(
         "marker turn",
-        "markers are brighter than black cells, which tells the view's side",
+        "markers are brighter than black cells, which determines the view's side",
         "no wrong id",
         "extractor/numbering/mesh_parts.py",
         "return [front] if front != 0 else [1, -1]",
@@ -87,7 +87,7 @@ NUMBERING = (
     ),
     Rule(
         "relative brightness",
-        "places less bright than the brightest are no white cells",
+        "places less bright than the brightest place are no white cells",
         "no wrong id",
         "extractor/numbering/white_search.py",
         "if found.brightness[n] > MIN_RELATIVE_BRIGHTNESS * brightest",
@@ -103,7 +103,7 @@ NUMBERING = (
     ),
     Rule(
         "between inks",
-        "the cells beside the white one show their inks",
+        "the cells beside the white cell show their inks",
         "no wrong id",
         "extractor/native/numbering/white_cell.cpp",
         "return is_white_triangle() && is_between_inks();",
@@ -111,7 +111,7 @@ NUMBERING = (
     ),
     Rule(
         "white centroid",
-        "the white cell is tried at the centroid of the white, too",
+        "the white cell is tried at the centroid of the white area, too",
         "accuracy",
         "extractor/numbering/white_cell.py",
         "max_centroid_distance: float = 0.3",
@@ -130,7 +130,7 @@ NUMBERING = (
 GAPS = (
     Rule(
         "touch",
-        "cells in contact with numbered ones are numbered",
+        "cells in contact with numbered cells are numbered",
         "accuracy",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "update_numbers_by_contact(contacts, triangles, new_cells, numbering)",
@@ -146,7 +146,7 @@ GAPS = (
     ),
     Rule(
         "unique claim",
-        "a cell of the layout that two cells claim is given to neither",
+        "a cell of the layout that two cells may be is assigned to neither",
         "no wrong id",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "assignments.candidate_count[place] != 1",
@@ -154,7 +154,7 @@ GAPS = (
     ),
     Rule(
         "nearest first",
-        "the cells nearest to numbered ones are numbered first",
+        "the cells nearest to numbered cells are numbered first",
         "no wrong id",
         "extractor/numbering/gaps/cell_claims.py",
         "joint_gap: float = 1.7",
@@ -178,7 +178,7 @@ GAPS = (
     ),
     Rule(
         "first check",
-        "cells are checked before detached ones are numbered, too",
+        "cells are also checked before detached cells are numbered",
         "no wrong id",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "out, consistent_cells(contacts, out, white_px, neighbours, limits.check), neighbours);",

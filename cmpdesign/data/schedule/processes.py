@@ -64,5 +64,5 @@ def require_versions(wanted: Mapping[str, str]) -> None:
         if wanted.get(name) != found:
             raise CmpDesignError(
                 f"a worker has {name} {found}, this program {wanted.get(name)}; install the same versions on all "
-                "machines, or the data set's bytes depend on the machine"
+                "machines; otherwise the data set's bytes depend on the machine"
             )

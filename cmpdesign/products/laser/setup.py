@@ -34,7 +34,7 @@ class LaserSetup:
         power_percent, speed_mm_s, repeats: settings of the passes of cells.
         cut_power_percent, cut_speed_mm_s, cut_repeats: settings of holes and outline, which go through the sheet.
         hatch_mm: spacing of a pocket's lines or rings.
-        minimum_web_mm: the narrowest wall that holds.
+        minimum_web_mm: the narrowest wall that does not break.
         assumed: names of the values in use whose source begins with "assumed".
     """
 
@@ -57,7 +57,7 @@ class LaserSetup:
 
     @property
     def compensated(self) -> bool:
-        """Paths keep their distance from the outlines; else they are the outlines."""
+        """True if paths keep a distance from the outlines; else the paths are the outlines."""
         return self.kerf_x_mm > 0
 
 

@@ -10,6 +10,7 @@
 #include <nanobind/ndarray.h>
 
 #include <array>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -17,11 +18,8 @@
 #include <utility>
 #include <vector>
 
-#ifdef CMP_NEEDS_V3
-#include <cpuid.h>
-#endif
-
 #include "array.hpp"
+#include "processor.hpp"
 
 namespace cmp {
 
@@ -45,6 +43,7 @@ class Borrowed {
     for (Py_buffer& buffer : buffers_) PyBuffer_Release(&buffer);
   }
   const Py_buffer& add(PyObject* object, bool is_written, const Name& name) {
+    note_changeable();
     Py_buffer& buffer = buffers_.emplace_back();
     int flags = PyBUF_STRIDES | PyBUF_FORMAT | (is_written ? PyBUF_WRITABLE : 0);
     if (PyObject_GetBuffer(object, &buffer, flags) != 0) {
@@ -57,9 +56,14 @@ class Borrowed {
   }
   void keep(nb::object object) { objects_.push_back(std::move(object)); }
 
+  // Notes that something was read that may change later: an array, or an object that is no tuple.
+  void note_changeable() { ++changeable_; }
+  std::size_t changeable() const { return changeable_; }
+
  private:
   std::vector<Py_buffer> buffers_;
   std::vector<nb::object> objects_;
+  std::size_t changeable_ = 0;
 };
 
 template <class T>
@@ -202,8 +206,21 @@ concept Record = requires(const Fields& fields) {
 
 template <Record T>
 struct FromPython<T> {
+  // A tuple of nothing but numbers and such tuples, as limits are, is read once.
   static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
-    return T::read(Fields(object, name, borrowed));
+    static PyObject* last = nullptr;  // is kept, so that no other object gets its address
+    static std::optional<T> record;
+    if (object.ptr() == last) return *record;
+    if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
+    const std::size_t before = borrowed.changeable();
+    T found = T::read(Fields(object, name, borrowed));
+    if (PyTuple_Check(object.ptr()) != 0 && borrowed.changeable() == before) {
+      Py_INCREF(object.ptr());
+      Py_XDECREF(last);
+      last = object.ptr();
+      record.emplace(found);
+    }
+    return found;
   }
 };
 
@@ -212,6 +229,7 @@ template <class T, std::size_t N>
 struct FromPython<std::array<T, N>> {
   static std::array<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
     std::array<T, N> values;
+    if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
     if (PySequence_Check(object.ptr()) == 0 || nb::len(object) != N)
       throw nb::type_error((name.text() + " must have " + std::to_string(N) + " items").c_str());
     for (std::size_t k = 0; k < N; ++k) values[k] = FromPython<T>::get(nb::object(object[k]), name, borrowed);
@@ -241,25 +259,10 @@ nb::object to_python(std::tuple<T...>&& values) {
                     std::move(values));
 }
 
-#ifdef CMP_NEEDS_V3
-// Whether processor and system have AVX2, FMA and BMI2. Asked of the processor itself: __builtin_cpu_supports
-// of zig's library answers no on every processor.
-inline bool has_v3() {
-  constexpr unsigned FMA = 1U << 12, SAVED_BY_SYSTEM = 1U << 27, AVX2 = 1U << 5, BMI2 = 1U << 8,
-                     YMM_STATE = 6;
-  unsigned a = 0, b = 0, c = 0, d = 0;
-  if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & FMA) || !(c & SAVED_BY_SYSTEM)) return false;
-  unsigned low = 0, high = 0;
-  asm("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
-  return (low & YMM_STATE) == YMM_STATE && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & AVX2) &&
-         (b & BMI2);
-}
-#endif
-
 // Refuses to go on where the processor lacks the instructions that the loops were compiled for.
 inline void require_processor() {
 #ifdef CMP_NEEDS_V3
-  if (!has_v3())
+  if (!ProcessorFlags().has_v3())
     throw nb::import_error(
         "this build needs a processor with AVX2, FMA and BMI2 (x86-64-v3); for older ones build with "
         "pip install . -C cmake.define.CMP_CPU=x86-64");

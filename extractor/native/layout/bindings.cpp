@@ -1,4 +1,4 @@
-// Room "layout" as Python sees it.
+// Room "layout" for Python.
 #include "base/binding.hpp"
 
 #include "layout/lattice.hpp"

@@ -26,7 +26,7 @@ struct WeighedProfiles {
   Array<double, 2> lines;          // (n, 8)
   Array<double, 2> sums;           // (n, 24), bending and dot gain eliminated
   ShiftGradients gradients;        // likewise
-  Array<double, 1> weight;         // (n,) 0 to 1, how well each gridline looks like the pattern
+  Array<double, 1> weight;         // (n,) 0 to 1, similarity of gridlines to the pattern
   Array<double, 1> bend_variance;  // (n,) px^2
   Array<double, 2> bend_response;  // (n, 7), as update_without_bending gives it
 };

@@ -1,4 +1,4 @@
-// What every step of refinement does, by profiles or by synthesis: bending of the gridlines, then the
+// The common part of steps of refinement, by profiles or by synthesis: bending of the gridlines, then the
 // markers.
 #pragma once
 

@@ -19,11 +19,11 @@ class InformationLimits(NamedTuple):
     """Limits of the information, of its solution and of its inverse.
 
     Attributes:
-        held_information: 1/px^2, of a marker that is held in place.
-        max_steps: of the conjugate gradients.
-        precision: of the solution, relative.
+        held_information: 1/px^2, of a marker that is held in place. Derived: more than any image holds.
+        max_steps: of the conjugate gradients. Chosen.
+        precision: of the solution, relative. Chosen.
         min_determinant: of a marker's block, relative to its squared trace; with less a direction is unknown, and the
-            marker has no covariance.
+            marker has no covariance. Chosen.
         shared: of the pixels that gridlines share.
     """
 

@@ -145,8 +145,8 @@ def test_a_source_is_given_once(sources: Path, tmp_path: Path) -> None:
     ("source", "said"),
     [
         ("0", "camera 0: expected files"),
-        ("missing.mp4", "missing.mp4: is no video that can be read"),
-        ("layout.json", "layout.json: is no video that can be read"),
+        ("missing.mp4", "missing.mp4 is no video that can be read"),
+        ("layout.json", "layout.json is no video that can be read"),
         ("*.mov", "no file matches this pattern"),
     ],
 )

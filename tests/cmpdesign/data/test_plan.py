@@ -45,7 +45,7 @@ def test_a_wrong_plan_is_one_line(tmp_path: Path, old: str, new: str, said: str)
 def test_jpeg_in_the_sensor_and_of_the_file_is_one_too_many(tmp_path: Path) -> None:
     plan = write_plan(tmp_path, kind="jpeg")
     plan.write_text(plan.read_text().replace("noise = {", "jpeg_quality = 90\nnoise = {"), encoding="utf-8")
-    assert "scene.sensor.jpeg_quality has no place beside" in refused("dataset", plan, "-o", tmp_path / "out")
+    assert "scene.sensor.jpeg_quality is not allowed with" in refused("dataset", plan, "-o", tmp_path / "out")
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_jpeg_in_the_sensor_and_of_the_file_is_one_too_many(tmp_path: Path) -> N
         (("--shards", "3:2"), "A below B"),
         (("--shards", "3"), "the plan has 2 shards"),
         (("--scheduler", "slurm"), "it must be local or dask=ADDRESS"),
-        (("--scheduler", "dask=a:1", "--workers", "2"), "workers has no place beside a dask scheduler"),
+        (("--scheduler", "dask=a:1", "--workers", "2"), "workers is not allowed with a dask scheduler"),
         (("--scheduler", "dask=missing.json"), "missing.json: no such scheduler file"),
         (("--workers", "1000"), "it must be from 1 to 512"),
     ],

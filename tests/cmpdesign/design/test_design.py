@@ -82,7 +82,7 @@ def test_values_out_of_range_name_value_limit_and_unit(fields: dict[str, object]
         ({"clip": "circle", "layers": 3, "pitch_mm": 1}, "needs clip_diameter_mm"),
         ({"clip": "rectangle", "layers": 3, "pitch_mm": 1, "clip_width_mm": 9}, "needs clip_height_mm"),
         ({"layers": 3, "pitch_mm": 1, "clip_width_mm": 9}, 'needs clip = "rectangle"'),
-        ({"layers": 3, "pitch_mm": 1, "clip": "circle", "clip_diameter_mm": 2}, "nothing inside a border"),
+        ({"layers": 3, "pitch_mm": 1, "clip": "circle", "clip_diameter_mm": 2}, "no area inside a border"),
     ],
 )
 def test_under_and_over_determined_sizes_say_how_to_mend(fields: dict[str, object], words: str) -> None:

@@ -87,7 +87,7 @@ def test_none_takes_away_and_what_tells_of_a_file_stays_there(tmp_path: Path) ->
         ({"a": "extends = 3"}, "must be a name or a path"),
         ({"a": 'extends = ""'}, "must be a name or a path"),
         ({"a": 'extends = "."'}, "cannot be read"),
-        ({"a": 'extends = "b.toml"', "b": "layers = ="}, "b.toml: is no valid TOML: "),
+        ({"a": 'extends = "b.toml"', "b": "layers = ="}, "b.toml is no valid TOML: "),
         ({"a": 'extends = "b.toml"', "b": 'pattern = "round"\nlayer = 3'}, "layer is unknown"),
         ({"a": 'extends = "tac3d"\nlaser = 3'}, "laser = 3 must be"),
         (

@@ -99,7 +99,7 @@ def test_the_command_says_what_it_removed(tmp_path: Path) -> None:
     gone = before - {path.name for path in laser.iterdir()}
     # An old job that would still cut the pad out.
     assert gone == {f"5-outline.{kind}" for kind in ("svg", "dxf", "lbrn2", "gcode")}
-    assert all(f"{name}, of an earlier build" in text for name in gone) and LIST_NAME not in text
+    assert all(f"{name}: written by an earlier build" in text for name in gone) and LIST_NAME not in text
     assert (laser / "mine.svg").exists() and (tmp_path / "out" / "pattern.svg").exists()
 
 

@@ -202,7 +202,7 @@ def test_a_picture_lies_beside_the_file(written, tmp_path: Path) -> None:  # typ
         ),
         (
             "[camera]\n[sequence]\nframes = 2\n[sequence.values]\ncamera.tilt_deg = [[0, 1], [0, 2]]",
-            "each later",
+            "in increasing order",
         ),
         (
             "[camera]\n[sequence]\nframes = 2\n[sequence.values]\ncamera.tilt_deg = [[0, 1], [1, [2]]]",

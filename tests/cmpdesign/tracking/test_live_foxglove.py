@@ -206,7 +206,7 @@ def test_what_viewers_did_not_get_is_said(
     monkeypatch.setattr(FoxgloveServer, "is_behind", lambda _: True)
     result = run(*command, *options)
     assert result.exit_code == 0 and f"of {FRAMES} frames were not shown live" in result.stderr
-    assert "a live viewer read more slowly than frames came" in " ".join(result.stderr.split())
+    assert "a live viewer read more slowly than the frames were made" in " ".join(result.stderr.split())
     monkeypatch.setattr(FoxgloveServer, "send", lambda *_: 1 / 0)
     result = run(*command, *options)
     assert result.exit_code == 0 and "the live server stopped after 0 frames (ZeroDivision" in result.stderr

@@ -234,7 +234,7 @@ def test_a_table_that_is_being_written_is_left_alone(kind: str, made: Path, tmp_
     sink.add(tracker.track(None))
     sink.close()
     assert frames_count(table) == 1
-    assert "nothing to recover" in refused(*command, "--recover")
+    assert "no table to recover" in refused(*command, "--recover")
     assert "is a folder; give a file's name" in refused(*command[:3], "-o", tmp_path.root, "--recover")
 
 

@@ -95,7 +95,7 @@ def test_a_camera_that_stops(made: Path, tmp_path: Path, monkeypatch: pytest.Mon
     camera = StoppingCamera(made / "frames", 8)
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: camera)
     line = refused("track", made / "layout.json", "0", "-o", tmp_path / "a.npz", "--max-pixels", 60_000)
-    assert "camera 0: its frames have 320 x 240 px; the limit is 0.06 megapixels" in line
+    assert "camera 0: the frames have 320 x 240 px; the limit is 0.06 megapixels" in line
     result = run("track", made / "layout.json", "0", "-o", tmp_path / "a.npz")
     assert result.exit_code == 1 and "the camera stopped after 8 frames" in result.stderr
     table = loaded(tmp_path / "a.npz")

@@ -197,7 +197,7 @@ def test_arrays_that_do_not_fit_are_kept_in_pieces_and_recovered(made: Path, tmp
     table = loaded(tmp_path / "a.npz")
     np.testing.assert_allclose(table["xy_px"], whole["xy_px"])
     np.testing.assert_allclose(table["rest_xy_px"], whole["rest_xy_px"])
-    assert "nothing to recover" in refused(*arguments, "--recover")
+    assert "no table to recover" in refused(*arguments, "--recover")
 
 
 @pytest.fixture(scope="module")

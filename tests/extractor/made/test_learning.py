@@ -150,7 +150,7 @@ def test_what_cannot_be_learnt_from_is_told() -> None:
     )
     pressed = pad_picture(3, Press(radius_mm=2.5, depth_mm=0.01)).image
     message = told((*images[:3], pressed, *images[4:]))
-    assert message.startswith("picture 4: its markers lie 0.0") and "limit 2" in message
+    assert message.startswith("picture 4: the markers lie 0.0") and "limit 2" in message
     assert "leave it out if the pad was pressed" in message
     back = np.ascontiguousarray(images[2][:, ::-1])
     both = (*images[:2], back, *images[3:])

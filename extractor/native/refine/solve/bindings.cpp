@@ -1,4 +1,4 @@
-// Room "solve" as Python sees it.
+// Room "solve" for Python.
 #include "base/binding.hpp"
 
 #include "refine/solve/convergence.hpp"

@@ -1,7 +1,8 @@
 #include "refine/solve/convergence.hpp"
 
 #include <cmath>
-#include <limits>
+
+#include "numeric/median.hpp"
 
 namespace cmp::refine {
 
@@ -10,13 +11,9 @@ namespace {
 // The median of the numbers that are not NaN; NaN without any.
 double median_of_known(View<const double, 1> values) {
   Array<double, 1> known({values.size()});
-  double* const begin = known.begin();
   double* const end =
-      std::copy_if(values.begin(), values.end(), begin, [](double v) { return !std::isnan(v); });
-  if (begin == end) return std::numeric_limits<double>::quiet_NaN();
-  double* const middle = begin + (end - begin) / 2;
-  std::nth_element(begin, middle, end);
-  return (end - begin) % 2 != 0 ? *middle : (*std::max_element(begin, middle) + *middle) / 2;
+      std::copy_if(values.begin(), values.end(), known.begin(), [](double v) { return !std::isnan(v); });
+  return numeric::median_of_many(known.slice(0, end - known.begin()));
 }
 
 // The sum of the steps that would follow a step (x, y) after another one, in units of this step, if they

@@ -1,4 +1,4 @@
-// The error that the last step by synthesis leaves.
+// The remaining error after the last step by synthesis.
 #pragma once
 
 #include "base/array.hpp"

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/processor.hpp"
 #include "refine/synthesis/gridlines.hpp"
 
 namespace cmp::refine {
@@ -152,6 +153,17 @@ bool is_small(const std::array<CellSide, 3>& sides) {
   return square < (numeric::NORMAL_REACH + bow) * (numeric::NORMAL_REACH + bow);
 }
 
+// Fills in the shares of a cell in pixels; see fill_coverage.
+void fill_shares(Index count, double x0, double y0, const CellOutline& outline, CellPixels& pixels) {
+  const Index padded = padded_count(count);
+  for (Index k = 0; k < 3; ++k) fill_distances(k, padded, x0, y0, outline, pixels);
+  if (is_small(outline.sides)) {
+    fill_three_side_coverage(outline, padded, pixels);
+  } else {
+    fill_two_side_coverage(outline, padded, pixels);
+  }
+}
+
 }  // namespace
 
 CellOutline cell_outline(View<const std::int32_t, 1> cell, View<const std::int32_t, 1> cell_edges,
@@ -195,13 +207,7 @@ void fill_row_ends(const CellOutline& outline, double top, Index count, const Ro
 }
 
 void fill_coverage(Index count, double x0, double y0, const CellOutline& outline, CellPixels& pixels) {
-  const Index padded = padded_count(count);
-  for (Index k = 0; k < 3; ++k) fill_distances(k, padded, x0, y0, outline, pixels);
-  if (is_small(outline.sides)) {
-    fill_three_side_coverage(outline, padded, pixels);
-  } else {
-    fill_two_side_coverage(outline, padded, pixels);
-  }
+  run_loop<fill_shares>(count, x0, y0, outline, pixels);
 }
 
 }  // namespace cmp::refine

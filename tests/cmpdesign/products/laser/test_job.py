@@ -82,7 +82,7 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings_", "expected"),
     [
-        (["laser.kerf_mm=1.2mm", "fiducials.diameter_mm=3"], "that the kerf leaves nothing of: "),
+        (["laser.kerf_mm=1.2mm", "fiducials.diameter_mm=3"], "that are narrower than the kerf: "),
         (
             ["fiducials.diameter_mm=0.1"],
             "diameter of the fiducial holes, against the kerf: 0.1 mm, limit 0.171 mm; make fiducials.diameter_mm",
