@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from extractor.layout.gridline_slopes import end_couplings, scatter_bending, slope_weights
 from extractor.layout.reference import BLACK, Reference
-from extractor.localmap.regularised_maps import LIMITS as MAP_LIMITS
 
 MAX_NEIGHBOURS = 6  # of a marker
 MAX_RING_MARKERS = 18  # in the two rings around a marker
 MAP_DERIVATIVES = 5  # x, y, xx, xy, yy
-MAX_CONDITION = (
-    1e4  # of the normal equations of a map; cubics have 2e2 to 3e3 with four rows, 4e4 or more with three
-)
+# Of a quadratic through the markers around another: how many determine its curvature, and what is added to the diagonal
+# of the normal equations of the curvature, in the unit of ``ring_vectors``.
+MIN_FIRM_MARKERS, FIRM_RIDGE = 8, 0.001
+# Of the normal equations of a map: a cubic has 2e2 to 3e3 with four rows of markers, and 4e4 or more with three.
+MAX_CONDITION = 1e4
 MAX_ONWARD_COSINE = np.cos(np.radians(150.0))  # between the two edges at a marker that form one gridline
 
 
@@ -35,8 +36,9 @@ class Topology(NamedTuple):
         ring_vectors: (M, 18, 2) float64, the layout vectors from a marker to its ``ring_markers``, in units of the
             mean edge, y up.
         derivative_stencil: (M, 5, 18) float64, weights of the differences to the ``ring_markers`` that give the
-            map's derivatives x, y, xx, xy, yy: least squares of a cubic where the markers determine one, else of a
-            quadratic as in ``regularised_maps``; 0 where these are too few.
+            map's derivatives x, y, xx, xy, yy by least squares: the first ones of a cubic, or of a quadratic where only
+            three rows of markers are there, as at the rim; the second ones of a quadratic through all of them, which
+            noise and scatter change least. 0 with fewer than 8 markers.
         edge_vectors: (E, 2) float64, from an edge's start to its end, in the unit of ``ring_vectors``.
         next_markers: (E, 2) int32, on the same gridline the marker before an edge's start and the marker after its end.
         third_differences: (E, 2) float64, the layout's third difference along these four markers, in the unit of
@@ -185,7 +187,7 @@ def _derivative_stencil(
     ring_markers: NDArray[np.int32], ring_vectors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(M, 5, 18) float64, see ``Topology.derivative_stencil``."""
-    known = ring_markers >= 0
+    known: NDArray[np.bool_] = np.asarray(ring_markers >= 0)
     x, y = ring_vectors[..., 0], ring_vectors[..., 1]
     quadratic = np.stack([x, y, x * x / 2, x * y, y * y / 2], axis=2)
     cubic = np.concatenate(
@@ -194,11 +196,13 @@ def _derivative_stencil(
     out = np.zeros((len(ring_markers), MAP_DERIVATIVES, MAX_RING_MARKERS))
     with np.errstate(divide="ignore"):
         near = np.where(known, (x * x + y * y) ** -2.0, 0.0)
-    enough = np.flatnonzero(known.sum(axis=1) >= MAP_LIMITS.min_firm_neighbours)
-    ridge = np.array([0.0, 0.0, *[MAP_LIMITS.firm_ridge] * 3])
-    every = known * 1.0
+    enough = np.flatnonzero(known.sum(axis=1) >= MIN_FIRM_MARKERS)
+    ridge = np.array([0.0, 0.0, *[FIRM_RIDGE] * 3])
     first, second = slice(0, 2), slice(2, MAP_DERIVATIVES)
-    fits = (quadratic, near, ridge, first), (cubic, every, 0.0, first), (quadratic, every, ridge, second)
+    complete: NDArray[np.bool_] = known.all(axis=1)
+    even = np.where(complete[:, None], 1.0, near)
+    every = known.astype(np.float64)
+    fits = (quadratic, near, ridge, first), (cubic, even, 0.0, first), (quadratic, every, ridge, second)
     for terms, weight, added, rows in fits:
         solutions, regular = _least_squares(terms[enough], weight[enough], added)
         out[enough[regular], rows] = solutions[regular, rows]

@@ -56,8 +56,16 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
   Array<double, 1> weight = judged ? Array<double, 1>(profile_weight.view())
                                    : lenient_weights(profile_weight, sums, edges, spokes, limits.outliers);
   const Array<double, 2> curved = curving(topology.end_couplings, state.scatter.share, bent.response);
-  const GridlineSystem system{
-      sums, weight, lines, contrasts, curved, edges, spokes, state.sigma, state.noise * state.noise};
+  const GridlineSystem system{sums,
+                              weight,
+                              lines,
+                              contrasts,
+                              curved,
+                              edges,
+                              spokes,
+                              state.sigma,
+                              state.noise * state.noise,
+                              state.scatter.share};
   WeighedSolution solved = solve_weighed(system, gradients, state.bend, bent.response,
                                          {state.xy, state.hidden}, false, judged, limits.step);
   return {std::move(profile_weight),

@@ -28,8 +28,8 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
                       static_cast<double>(rule.min_places), rule.default_weight, weights);
   const double noise = std::isfinite(weighed.noise) ? weighed.noise : state.noise;
   const Array<double, 2> curved = curving(topology.end_couplings, state.scatter.share, bent.response);
-  const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,    curved,
-                              edges, topology.spokes, sigma, noise * noise};
+  const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,     curved,
+                              edges, topology.spokes, sigma, noise * noise, state.scatter.share};
   WeighedSolution solved = solve_weighed(system, gradients, drawing.bend, bent.response,
                                          {state.xy, state.hidden}, true, judged, limits.step);
   return {std::move(weighed.weight),

@@ -21,7 +21,8 @@ class ConvergenceLimits(NamedTuple):
     Attributes:
         remaining_share: of a step, per blur, that another step would still correct. Chosen.
         max_remaining_share: of a step, at most. Chosen.
-        max_shrinking: of a marker's last step over the step before, at most; by it the following steps would shrink. Chosen.
+        max_shrinking: of a marker's last step over the step before, at most; the following steps would shrink by the
+            same factor. Chosen.
         mean_over_median: of squares, by which the median of the squared shifts becomes their mean. Derived: 1 / ln 2,
             of the sum of two normal squares.
     """

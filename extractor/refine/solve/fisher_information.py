@@ -19,6 +19,10 @@ class InformationLimits(NamedTuple):
     """Limits of the information, of its solution and of its inverse.
 
     Attributes:
+        step_coupling: in the matrix of a step, a gridline moves with each end by that share more than a straight line,
+            and with the other end by that share less. Inside the pattern a gridline does, because a marker that moves
+            alone bends the gridlines around it (``gridline_slopes``). At the rim a gridline moves less, but steps by the
+            exact couplings overshoot there. Measured: `tests/extractor/refine/test_bending.py` had a marker 0.4 px off.
         held_information: 1/px^2, of a marker that is held in place. Derived: more than any image holds.
         max_steps: of the conjugate gradients. Chosen.
         precision: of the solution, relative. Chosen.
@@ -27,6 +31,7 @@ class InformationLimits(NamedTuple):
         shared: of the pixels that gridlines share.
     """
 
+    step_coupling: float = 0.1
     held_information: float = 1e12
     max_steps: int = 80
     precision: float = 1e-3

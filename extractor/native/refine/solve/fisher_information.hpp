@@ -35,18 +35,20 @@ struct GridlineSystem {
   View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
   double sigma;                        // the blur, px
   double variance;                     // of the noise, squared gray levels, one channel
+  double scatter_share;                // 0 to 1, as in MarkerScatter
 };
 
 // Limits of the information; explained in extractor/refine/solve/fisher_information.py.
 struct InformationLimits {
-  double held_information;
+  double step_coupling, held_information;
   Index max_steps;
   double precision, min_determinant;
   SharedPixelLimits shared;
 
   template <class F>
   static InformationLimits read(const F& f) {
-    return {f["held_information"], f["max_steps"], f["precision"], f["min_determinant"], f["shared"]};
+    return {f["step_coupling"], f["held_information"], f["max_steps"],
+            f["precision"],     f["min_determinant"],  f["shared"]};
   }
 };
 
@@ -58,12 +60,16 @@ struct InformationLimits {
 Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
                          View<const double, 2> bend_response);
 
-// The information about the markers.
+// The information about the markers, as a step uses it: every gridline curves as inside the pattern.
 //
 // prior (M,) 1/px^2, before the measurement; overlapping, the sums include the gridlines' ends, where
 // gridlines share their pixels.
 InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
                                      bool overlapping, const InformationLimits& limits);
+
+// The information of a step with gridlines that curve as the system says, for covariances.
+InformationArrays with_curving(const InformationArrays& of_step, const GridlineSystem& system,
+                               const InformationLimits& limits);
 
 // (M, 2) 1/px, the gradient of the log-likelihood at each marker.
 //
