@@ -199,8 +199,8 @@ def _derivative_stencil(
     enough = np.flatnonzero(known.sum(axis=1) >= MIN_FIRM_MARKERS)
     ridge = np.array([0.0, 0.0, *[FIRM_RIDGE] * 3])
     first, second = slice(0, 2), slice(2, MAP_DERIVATIVES)
-    complete: NDArray[np.bool_] = known.all(axis=1)
-    even = np.where(complete[:, None], 1.0, near)
+    complete = (ring_markers >= 0).all(axis=1, keepdims=True)
+    even = np.where(complete, 1.0, near)
     every = known.astype(np.float64)
     fits = (quadratic, near, ridge, first), (cubic, even, 0.0, first), (quadratic, every, ridge, second)
     for terms, weight, added, rows in fits:
