@@ -37,7 +37,19 @@ from tests.support.pictures import (
 )
 
 TRIANGULAR = PATTERNS[:3]
-STAGES = ["image", "color", "target", "segment", "seeds", "grow", "triangles", "cells", "mesh", "number"]
+STAGES = [
+    "image",
+    "light",
+    "color",
+    "target",
+    "segment",
+    "seeds",
+    "grow",
+    "triangles",
+    "cells",
+    "mesh",
+    "number",
+]
 
 
 def errors_px(markers: Markers, truth: Truth) -> NDArray[np.float64]:
