@@ -21,8 +21,8 @@ class InformationLimits(NamedTuple):
     Attributes:
         step_coupling: in the matrix of a step, a gridline moves with each end by that share more than a straight line,
             and with the other end by that share less. Inside the pattern a gridline does, because a marker that moves
-            alone bends the gridlines around it (``gridline_slopes``). At the rim a gridline moves less, but with the exact
-            couplings steps overshoot there. Measured: `tests/extractor/refine/test_bending.py` had a marker 0.4 px off.
+            alone bends the gridlines around it (``gridline_slopes``). At the rim gridlines move less, but steps by the
+            exact couplings overshoot. Measured: `tests/extractor/refine/test_bending.py` had a marker 0.4 px off.
         held_information: 1/px^2, of a marker that is held in place. Derived: more than any image holds.
         max_steps: of the conjugate gradients. Chosen.
         precision: of the solution, relative. Chosen.
