@@ -131,9 +131,7 @@ def test_a_wrong_mirror_puts_a_view_on_the_other_side_and_is_refused() -> None:
     rig = unplaced(views)
     assert Reconstructor(LAYOUT, rig, seen).poses.views[0].position_mm[2] < 0
     wrong = View(left.name, left.focal_px, left.centre_px, left.distortion, mirrored=False)
-    with pytest.raises(
-        PoseError, match="view 'left' would look at the pattern's front, view 'right' at its back"
-    ):
+    with pytest.raises(PoseError, match="view 'left' would see the pattern's front, view 'right' its back"):
         Reconstructor(LAYOUT, Rig((wrong, rig.views[1])), seen)
     assert right.position_mm[2] < 0
 

@@ -188,7 +188,7 @@ def test_a_tiny_baseline_is_refused_at_the_start(apart_deg: float) -> None:
     views = (looking("a", tilt_deg=20.0), looking("b", tilt_deg=20.0 + apart_deg))
     rng = np.random.default_rng(11)
     rest = [noisy(LAYOUT, view, flat(LAYOUT), rng) for view in views]
-    with pytest.raises(PoseError, match="views 'a' and 'b' stand too near to each other to tell depth"):
+    with pytest.raises(PoseError, match="views 'a' and 'b' stand too near to each other to measure depth"):
         Reconstructor(LAYOUT, unplaced(views), rest)
 
 
@@ -289,7 +289,7 @@ def test_mistakes_are_refused_by_name() -> None:
         (
             Rig(views),
             [replace(rest[0], mirrored=not rest[0].mirrored), rest[1]],
-            "view 'left': its pose looks at",
+            "view 'left': its pose faces the other side",
         ),
         (
             Rig(views),
