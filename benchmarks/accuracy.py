@@ -3,8 +3,9 @@
     python -m benchmarks.accuracy [--quick] [--json FILE] [--publish]
 
 Standard scene (640 x 480 px, 11 layers, edges of 20 px, turned by 7.3 degrees, blur 1 px, sRGB, noise 2/255) unless a
-row says otherwise; inks, blur and noise are not given to the extractor. Errors are RMS per axis; the bound is the exact
-Cramer-Rao bound of the same sRGB picture and markers. "inner" are the markers with all their gridlines. z is the RMS
+row states another value; inks, blur and noise are not given to the extractor. Errors are RMS per axis; the bound is the
+exact Cramer-Rao bound of the same sRGB picture and markers. "inner" are the markers with all their gridlines. z is the
+RMS
 error over the stated covariance per axis: 1 is right. The calibration of all markers and virtual markers follows each
 table.
 """

@@ -1,4 +1,4 @@
-"""Random damage: how many markers are wrong, and whose images they are in, over as many seeds as asked for.
+"""Random damage: the number of wrong markers and their images, over any number of seeds.
 
     python -m benchmarks.damage [--images N] [--seed S] [--json FILE]
     python -m benchmarks.damage --only "random blobs/round/5017" --save DIR     one image, read alone, and its overlay

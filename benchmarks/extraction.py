@@ -1,4 +1,4 @@
-"""Cold extraction: how long, and how its time grows with the pixels and with the markers, stage by stage.
+"""Cold extraction: its time, and the growth of the time with the pixels and with the markers, stage by stage.
 
     python -m benchmarks.extraction [--quick] [--json FILE] [--publish]
 

@@ -1,6 +1,6 @@
 """Laser jobs: travel against vpype, time to write all formats, areas over kerf. One run prints all figures.
 
-vpype needs old packages, so it is installed in its own environment on the first run.
+vpype needs old packages; therefore it is installed in its own environment on the first run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Rendering: its time, and its own error against a reference that shares no step with it.
+"""Rendering: its time, and its own error against an independent reference.
 
     python -m benchmarks.rendering [--quick] [--json FILE]
 
@@ -6,10 +6,10 @@ Scenes of 640x480 and 331 markers: flat, seen through a distorting lens, pressed
 the back), and that in the two halves of a virtual binocular. Blur 1 px and none, no noise. For its time only, a steep
 dent that hides a part of itself.
 
-The reference (``benchmarks.support.scanlines``) shares no step with the renderer. It is inexact for sides along its
-scan lines, so the patterns are rotated by 30 degrees, the flat one by 7.3. The error in grey levels is that of a linear
-16-bit image, in 8-bit units. The error in px is the shift of the gridlines' middles along their normals with which the
-reference fits the image best. Times are those of sRGB images. One core.
+The reference (``benchmarks.support.scanlines``) shares no step with the renderer. The reference is inexact for sides
+along its scan lines, so the patterns are rotated by 30 degrees, the flat one by 7.3. The error in grey levels is that
+of a linear 16-bit image, in 8-bit units. The error in px is the shift of the gridlines' middles along their normals
+with which the reference fits the image best. Times are those of sRGB images. One core.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Whole processes: the first markers, what a command costs from the shell, and how the largest pattern builds.
+"""Whole processes: time to the first markers, time of a command from the shell, and time to build the largest pattern.
 
 python -m benchmarks.startup [--quick] [--json FILE]
 """
@@ -40,7 +40,7 @@ COMMANDS = {
     ],
     "cmpdesign build honeycomb": ["build", "honeycomb", "-o", "made"],
 }
-# From the start of a process to the markers of one PNG, beside the import of what reads it.
+# From the start of a process to the markers of one PNG, and the import of the libraries alone.
 LIBRARIES = "import numpy, cv2"
 FIRST_MARKERS = """
 import sys

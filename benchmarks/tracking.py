@@ -1,4 +1,4 @@
-"""Tracking over a long sequence: ids, error and time, with Lucas-Kanade optical flow on the same frames beside it.
+"""Tracking over a long sequence: ids, error and time, compared with Lucas-Kanade optical flow on the same frames.
 
     python -m benchmarks.tracking [--quick] [--json FILE] [--plot FILE.png]
 
@@ -100,7 +100,7 @@ class TrackedFrame(NamedTuple):
 
 
 class FrameErrors(NamedTuple):
-    """Errors of one frame in px and px^2; NaN where nothing was found."""
+    """Errors of one frame in px and px^2; NaN without markers."""
 
     squared: float
     worst: float

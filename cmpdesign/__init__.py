@@ -1,11 +1,11 @@
 """Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
 
-Whatever a command does is one call by the same name:
+Every command is also one call by the same name:
 
     design = cmpdesign.load("tac3d", layers=8)      a design; design.layout, design.check(), design.write("out")
-    cmpdesign.size((1280, 960), (24, 18))           which design suits a camera and its field of view
+    cmpdesign.size((1280, 960), (24, 18))           a design for a camera and its field of view
     cmpdesign.render(design.layout, noise=2)        a picture with its exact truth
-    cmpdesign.verify("layout.json", "photo.png")    a picture judged; extractor.Extractor reads without judging
+    cmpdesign.verify("layout.json", "photo.png")    a verdict on a picture; extractor.Extractor reads without a verdict
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
     cmpdesign.kerf, calibrate_pattern, run_experiment, export_lerobot, export_zarr

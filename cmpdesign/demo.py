@@ -30,9 +30,9 @@ class DemoScore:
     """Markers against the ground truth.
 
     Attributes:
-        visible: number of markers that the image shows.
+        visible: number of markers that are visible in the image.
         measured, repaired, lost: numbers of visible markers by status.
-        wrong: number of markers that are nearer to another marker's true place than to their own.
+        wrong: number of markers that are nearer to another marker's true place than to their own true place.
         rms_px: root mean square error of the measured markers, per axis.
         max_px: largest distance of a measured marker from its true place.
     """

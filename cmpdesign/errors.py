@@ -1,4 +1,4 @@
-"""Errors for users: every message names the value, the limit, the unit and the remedy."""
+"""Errors for users. Every message names the value, the limit, the unit and the remedy."""
 
 from __future__ import annotations
 

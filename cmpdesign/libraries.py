@@ -1,4 +1,5 @@
-"""Libraries that may be missing: each belongs to an extra; a missing one is one line with the command that helps.
+"""Libraries that may be missing. Each library belongs to an extra; a missing library gives one line with the install
+command.
 
 Modules import such a library where they first use it, within ``with extra("laser"):``.
 """
@@ -9,7 +10,7 @@ import json
 import re
 import shlex
 import sys
-from importlib.metadata import PackageNotFoundError, distribution, requires
+from importlib.metadata import PackageNotFoundError, distribution, requires, version
 from importlib.util import find_spec
 from types import TracebackType
 from urllib.parse import urlparse
@@ -17,7 +18,7 @@ from urllib.request import url2pathname
 
 from cmpdesign.errors import CmpDesignError
 
-# Extras by what they are for; pyproject.toml names their libraries.
+# Extras and their purposes; pyproject.toml names the libraries.
 EXTRAS = {
     "laser": "laser jobs and kerf coupons",
     "cad": "molds, STEP files, meshes",
@@ -26,7 +27,7 @@ EXTRAS = {
     "parquet": "tables as Parquet",
     "recording": "recordings for ROS 2 and Foxglove",
     "export": "data sets for LeRobot and Diffusion Policy",
-    "live": "frames sent to Foxglove while they are read",
+    "live": "frames shown in Foxglove during a run",
     "rerun": "recordings and a live view for Rerun",
     "data": "data sets for training",
     "dask": "data sets made by several machines",
@@ -35,10 +36,17 @@ EXTRAS = {
 _DISTRIBUTIONS = {
     "OCP": "cadquery-ocp-novtk",
     "PIL": "pillow",
-    "cv2": "opencv-contrib-python-headless",
+    "cv2": "opencv-python-headless",
     "foxglove": "foxglove-sdk",
     "rerun": "rerun-sdk",
 }
+# Distributions that bring OpenCV; the first is required. Each suffices; two in one environment overwrite each other.
+OPENCV_DISTRIBUTIONS = (
+    "opencv-python-headless",
+    "opencv-contrib-python-headless",
+    "opencv-python",
+    "opencv-contrib-python",
+)
 _OWN = ("cmpdesign", "extractor")
 
 
@@ -51,7 +59,7 @@ class extra:
 
     Args:
         name: the extra that brings the libraries, of ``EXTRAS``.
-        instead: what can be done without the libraries, as "write .csv".
+        instead: remedy without the libraries, as "write .csv".
     """
 
     __slots__ = ("_instead", "_name")
@@ -76,10 +84,10 @@ class extra:
 
 
 def require_libraries(name: str, *modules: str, instead: str = "") -> None:
-    """Look for modules of an extra before work that would stop where the first one is missing.
+    """Check that the modules of an extra are installed, before work that needs them.
 
     Raises:
-        MissingLibraryError: one is not installed.
+        MissingLibraryError: a module is not installed.
     """
     with extra(name, instead):
         for module in modules:
@@ -88,17 +96,27 @@ def require_libraries(name: str, *modules: str, instead: str = "") -> None:
 
 
 def install_command(name: str) -> str:
-    """The command that installs an extra, from where this package itself was installed."""
+    """The command that installs an extra, from the source of this package's own installation."""
     source, options = _installed_from()
     wanted = f"{source}[{name}]"
     quoted = f'"{wanted}"' if sys.platform == "win32" else shlex.quote(wanted)
     return f"pip install {options}{quoted}"
 
 
+def opencv_version() -> str:
+    """Version of the installed distribution that brings OpenCV, of ``OPENCV_DISTRIBUTIONS``; "unknown" if none is."""
+    for name in OPENCV_DISTRIBUTIONS:
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            continue
+    return "unknown"
+
+
 def missing_library_text(error: ModuleNotFoundError) -> str | None:
     """One sentence with the remedy, for a library that every installation has.
 
-    None for a module that no requirement brings, which is a fault of the program.
+    None for a module that no requirement contains, which is a fault of the program.
     """
     module = _top_module(error)
     if module is None or module in _OWN or module in sys.stdlib_module_names:
@@ -115,7 +133,7 @@ def _top_module(error: ModuleNotFoundError) -> str | None:
 
 
 def _base_requirement(name: str) -> str | None:
-    """What to give to pip for a distribution that is required without an extra."""
+    """The argument of pip for a distribution that is required without an extra."""
     try:
         lines = requires("cmpdesign") or []
     except PackageNotFoundError:  # run from a copy of the sources

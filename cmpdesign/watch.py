@@ -1,4 +1,4 @@
-"""How far long work is: the work tells how many of its parts are done, and whoever called it may watch."""
+"""Progress of long work: the work reports the number of finished parts to a function of the caller."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def _ignore(done: int, total: int, unit: str) -> None:
     """Nobody watches."""
 
 
-# (number of parts that are done, number of all parts, what a part is, as in "frames")
+# (number of finished parts, number of all parts, name of the parts, as in "frames")
 Watch = Callable[[int, int, str], None]
 Item = TypeVar("Item")
 _WATCH: ContextVar[Watch] = ContextVar("watch", default=_ignore)
@@ -20,7 +20,7 @@ _WATCH: ContextVar[Watch] = ContextVar("watch", default=_ignore)
 
 @contextmanager
 def watched(watch: Watch) -> Iterator[None]:
-    """Within this context, ``watch`` is called after every part that is done."""
+    """Within this context, ``watch`` is called after every finished part."""
     token = _WATCH.set(watch)
     try:
         yield
@@ -29,12 +29,12 @@ def watched(watch: Watch) -> Iterator[None]:
 
 
 def tell(done: int, total: int, unit: str = "parts") -> None:
-    """Tell how many parts of the work are done."""
+    """Report the number of finished parts."""
     _WATCH.get()(done, total, unit)
 
 
 def told(parts: Iterable[Item], total: int, unit: str = "parts") -> Iterator[Item]:
-    """The parts one after the other; each is told when the next one is asked for."""
+    """The parts one after the other; each is reported when the next part is requested."""
     for done, part in enumerate(parts, start=1):
         yield part
         tell(done, total, unit)

@@ -1,4 +1,4 @@
-"""Processes that work for this one, and end when this one ends, however it ends."""
+"""Worker processes that end when this process ends, also when this process is killed."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ MOST_ON_WINDOWS = 61
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """A pool of processes, each with an interpreter of its own.
 
-    The processes ignore Ctrl-C, which reaches all processes of a terminal: this process decides. They end
+    The processes ignore Ctrl-C, which reaches all processes of a terminal: this process handles Ctrl-C. The processes
+    end
 
     - with the block, after the work that was submitted;
-    - at once when an exception leaves the block: work that was begun is lost;
-    - at once when this process is gone, as after ``kill -9``.
+    - at once when an exception leaves the block: unfinished work is lost;
+    - at once when this process has ended, as after ``kill -9``.
 
     Args:
         workers: number of processes, 1 or more.
 
     Yields:
-        The pool; what is submitted to it must be picklable.
+        The pool; submitted functions and arguments must be picklable.
     """
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
@@ -44,7 +45,7 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             mine = set(active_children()) - others
             for process in mine:
                 process.kill()
-            for process in mine:  # until it is gone, a process holds the locks of its files
+            for process in mine:  # until its end, a process holds the locks of its files
                 process.join()
             raise
 
@@ -61,7 +62,7 @@ def _begin() -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait until the process that started this one is gone, and end this one."""
+    """Wait until the parent process has ended, and end this process."""
     from multiprocessing import parent_process
 
     parent = parent_process()

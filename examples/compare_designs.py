@@ -1,4 +1,4 @@
-"""Compare designs before one is made: the error of each marker in pictures of a pressed pad, against the truth.
+"""Compare designs before making one: the error of each marker in pictures of a pressed pad, against the truth.
 
     python examples/compare_designs.py
 

@@ -1,4 +1,4 @@
-"""Follow the markers through a video, frame by frame, as a program on a robot does.
+"""Follow the markers through a video, frame by frame, as in a program on a robot.
 
     python examples/follow_a_video.py [layout.json video.mp4]
 
@@ -16,7 +16,7 @@ from extractor import Tracker
 
 
 def draw_press(folder: str) -> str:
-    """Draw a pattern that is pressed deeper in every picture; its layout file."""
+    """Draw a pattern that is pressed deeper in every picture; return its layout file."""
     layout = cmpdesign.load("honeycomb", layers=5).layout
     for number in range(5):
         seen = cmpdesign.render(layout, pitch_px=30, press_mm=0.1 * number, noise=2, seed=number)

@@ -1,8 +1,8 @@
-"""A camera of LeRobot that is a tactile sensor: its images, and beside each the displacement of every marker.
+"""A camera of LeRobot that is a tactile sensor: its images, each with the displacement of every marker.
 
 LeRobot finds cameras in installed packages whose names begin with lerobot_camera_. Put this file into such a package as
-__init__.py, and configure the camera with type: cmpdesign_tactile. ``markers`` holds what belongs to the last image; a
-robot's get_observation() takes it up under the keys that ``cmpdesign export lerobot`` uses:
+__init__.py, and configure the camera with type: cmpdesign_tactile. ``markers`` holds the markers of the last image; a
+robot's get_observation() returns them under the keys of ``cmpdesign export lerobot``:
 
     observation["tactile.displacement_mm"] = camera.markers.displacement_mm
 """
@@ -55,7 +55,7 @@ class TactileCamera(Camera):  # type: ignore[misc]
 
     @staticmethod
     def find_cameras() -> list[dict[str, Any]]:
-        return []  # the system does not say which of its cameras is a sensor
+        return []  # the system does not state which cameras are sensors
 
     def connect(self, warmup: bool = True) -> None:
         """Open the camera; with ``warmup``, the first image is the rest frame."""

@@ -1,8 +1,8 @@
-"""From a measured kerf to the files of a laser job, and how the pad comes out of it.
+"""From a measured kerf to the files of a laser job, and the predicted pad.
 
     python examples/make_a_laser_job.py [template] [kerf in mm]
 
-It needs ezdxf and SciPy: pip install '.[laser]'.
+The example needs ezdxf and SciPy: pip install '.[laser]'.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""A pattern of one's own: where the markers are is one function; all else follows.
+"""A new pattern: one function gives the places of the markers; all other parts follow from it.
 
     python examples/my_own_pattern.py
 
-To have the pattern on the command line, put the function into a file of cmpdesign/patterns/.
+To use the pattern on the command line, put the function into a file of cmpdesign/patterns/.
 """
 
 from __future__ import annotations

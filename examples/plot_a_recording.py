@@ -1,8 +1,8 @@
-"""Track a press into a table, and plot it: displacement over time, and the arrows of all markers at its end.
+"""Track a press into a table, and plot the table: displacement over time, and the arrows of all markers at the end.
 
     python examples/plot_a_recording.py [layout.json video.mp4]
 
-It needs matplotlib: pip install '.[evaluate]'. Without arguments a ball is pressed into a simulated pad first.
+The example needs matplotlib: pip install '.[evaluate]'. Without arguments a ball is pressed into a simulated pad first.
 """
 
 from __future__ import annotations

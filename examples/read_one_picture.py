@@ -1,4 +1,4 @@
-"""Read one picture: which markers are where, how well, and what to do where it fails.
+"""Read one picture: places of the markers, their deviations, and the remedy for a failure.
 
     python examples/read_one_picture.py [layout.json picture.png]
 
@@ -22,7 +22,7 @@ def main(layout: str = "", picture: str = "") -> None:
         cmpdesign.render(design.layout, pitch_px=22, rotation_deg=12, noise=2).save(picture := "seen.png")
     image = cv2.imread(picture)
     if image is None:
-        sys.exit(f"{picture}: is no picture that OpenCV reads")
+        sys.exit(f"{picture} is no picture that OpenCV reads")
     markers = Extractor(layout).extract(image)
     if markers.reason is not None:
         sys.exit(f"{picture}: not read: {markers.reason}")

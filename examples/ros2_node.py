@@ -2,8 +2,8 @@
 
     python examples/ros2_node.py --ros-args -p layout:=out/layout.json -p frame_id:=tactile -r image_raw:=/camera/image
 
-It reads sensor_msgs/Image (bgr8 or rgb8) from the topic image_raw, and publishes sensor_msgs/PointCloud2 on
-<frame_id>/markers, with the fields of recordings (docs/how-to/recordings.md). It needs a ROS 2 installation with rclpy.
+The node reads sensor_msgs/Image (bgr8 or rgb8) from the topic image_raw, and publishes sensor_msgs/PointCloud2 on
+<frame_id>/markers, with the fields of recordings (docs/how-to/recordings.md). The node needs ROS 2 with rclpy.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TYPES = {
 
 
 class MarkerNode(Node):  # type: ignore[misc]
-    """Publishes the markers of every image; the first one in which the pattern is found is the rest frame."""
+    """Publishes the markers of every image; the first image in which the pattern is found is the rest frame."""
 
     def __init__(self) -> None:
         super().__init__("markers")

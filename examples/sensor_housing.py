@@ -2,7 +2,7 @@
 
     python examples/sensor_housing.py housing.step
 
-writes the housing and the pad in it. It needs build123d: pip install '.[cad]'.
+writes the housing with the pad. The example needs build123d: pip install '.[cad]'.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ CLEARANCE_MM, WALL_MM, LEDGE_MM, FLANGE_MM, CHAMBER_MM, SCREW_MM = 0.2, 3.0, 1.5
 
 
 def sensor(template: str) -> Compound:
-    """The housing and the pad of a design; z = 0 is the pad's back, the camera looks up from below."""
+    """The housing and the pad of a design; z = 0 is the pad's back, the camera is below the pad."""
     pad = pad_parts(load_design(template))
     size, top = pad.bounding_box().size, pad.children[-1].faces().sort_by(Axis.Z)[-1]
     wide, deep, edge = size.X + 2 * WALL_MM, size.Y + 2 * WALL_MM, size.X / 2 + WALL_MM + SCREW_MM

@@ -1,8 +1,8 @@
-"""Which pitch and how many layers suit a camera and its field of view, and what that costs and gives.
+"""Pitch and layers for a camera and its field of view, with error and resolution.
 
     python examples/size_for_my_camera.py [1280x960 24x18mm]
 
-It needs SciPy: pip install '.[evaluate]'.
+The example needs SciPy: pip install '.[evaluate]'.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def main(camera: str = "1280x960", view: str = "24x18mm") -> None:
             f"  {coarser.told_apart_mm:13.3f}"
         )
     finest.design.write("sized")
-    print("\nwrote the finest one to sized/")
+    print("\nwrote the finest design to sized/")
 
 
 if __name__ == "__main__":

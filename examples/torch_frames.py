@@ -6,8 +6,9 @@
         for image, target in DataLoader(frames, batch_size=32, num_workers=4, persistent_workers=False):
             loss = criterion(model(image.float() / 255), target["force_n"])
 
-Whole shards are shared out: no two workers, and no two machines of a distributed training, read the same one. Frames
-are shuffled in a buffer, since those of a shard come one after another.
+Complete shards are distributed: no two workers, and no two machines of a distributed training, read the same shard.
+    Frames
+are shuffled in a buffer, because the frames of a shard follow each other.
 """
 
 from __future__ import annotations
@@ -25,15 +26,16 @@ BUFFER = 256  # frames
 
 
 class TactileFrames(IterableDataset):
-    """Yields (image (3, H, W) uint8 RGB, targets), in another order in every epoch.
+    """Yields (image (3, H, W) uint8 RGB, targets), in a different order in every epoch.
 
     Args:
         folder: the data set.
-        seed: of the order.
-        rank, machines: which share of the shards this process reads, of how many; as of torch.distributed.
+        seed: seed of the order.
+        rank, machines: number of this process, and number of processes, which share the shards; as of
+            torch.distributed.
 
     Attributes:
-        epoch: set it before each epoch; the order depends on it.
+        epoch: set this number before each epoch; it determines the order.
     """
 
     def __init__(self, folder: str | Path, seed: int = 0, rank: int = 0, machines: int = 1) -> None:
@@ -66,7 +68,7 @@ def shuffled(frames: Iterator[Any], size: int, rng: np.random.Generator) -> Iter
 
 
 def sample(frame: cmpdesign.data.Frame) -> tuple[np.ndarray, dict[str, Any]]:
-    """What a model learns from, as arrays, of which PyTorch makes tensors."""
+    """The targets of a model, as arrays, which PyTorch converts to tensors."""
     places_mm = frame.arrays["true_xyz_mm"].copy()  # of the markers; less the layout's places: their motion
     return np.ascontiguousarray(frame.image[:, :, ::-1].transpose(2, 0, 1)), {
         "force_n": np.array(frame.values["force_n"], np.float32),

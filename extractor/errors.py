@@ -20,8 +20,8 @@ class RigError(ExtractorError, ValueError):
 
 
 class PoseError(ExtractorError, ValueError):
-    """Views whose poses cannot be estimated, or do not allow to measure in space; says which and why."""
+    """Views whose poses cannot be estimated, or give no positions in space; names the views and the cause."""
 
 
 class RestError(ExtractorError, ValueError):
-    """Rest pictures from which no places can be learnt; says which picture, the value, the limit and the remedy."""
+    """Rest pictures from which no places can be learnt; names the picture, the value, the limit and the remedy."""

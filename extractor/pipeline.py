@@ -48,10 +48,10 @@ from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
 from extractor.result import Markers, Origin, Reason
 
-WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first
+WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MAX_DOMAINS_PER_CELL = 3  # number of domains per cell of the pattern above which an image is cluttered,
-MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains
-MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern
+MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains; both chosen
+MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern; chosen
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]
@@ -77,7 +77,7 @@ class NumberedMarkers(NamedTuple):
     """Numbered markers before refinement.
 
     Attributes:
-        places: the markers as their cells place them.
+        places: the markers at the places given by their cells.
         mirrored: the image shows the pattern's back.
         origin: the evidence that fixed the numbering.
     """
@@ -126,15 +126,16 @@ class Extractor:
         layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
             a layout of cmpdesign.
         preset: "fast", "balanced" or "accurate".
-        response: how light became values: "srgb", "linear", an exponent (light is value ** exponent), or a table of the
-            light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
-        side: the side of the pattern that images show: "front", "back", or "designed": what the layout's ``mirrored``
-            says. An image of the other side gives no markers, and a reason. "either": both are read.
-        channels: the order of an image's colors: "bgr", as OpenCV has them, or "rgb".
+        response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
+            of the light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
+        side: the side of the pattern that images show: "front", "back", or "designed": the side that the layout's
+            ``mirrored`` states. An image of the other side gives no markers, and a reason. "either": both sides are
+            read.
+        channels: the order of an image's colors: "bgr", as in OpenCV, or "rgb".
 
     Raises:
         LayoutError: the layout is not a triangular pattern, or its file cannot be read.
-        TypeError: ``layout`` is none of these.
+        TypeError: ``layout`` is of another type.
         ValueError: no such preset, response, side or order of channels.
     """
 
@@ -174,15 +175,15 @@ class Extractor:
         self._sampled_cells = sampled_cells(layout)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is built anew from layout and options; buffers are not copied."""
+        """A copy is made from layout and options; buffers are not copied."""
         return type(self), (self.layout, *self._options)
 
     def extract(self, image: NDArray[Any]) -> Markers:
-        """The markers in one image, found without any knowledge of other frames.
+        """The markers in one image, found independently of other frames.
 
         Args:
             image: (H, W, 3) uint8, colors in the order of ``channels``; also uint16 of either byte order (scaled to 8
-                bits), with alpha (dropped) and grayscale (without color nothing is found, for the reason
+                bits), with alpha (dropped) and grayscale (without color no marker is found; the reason is
                 ``NO_COLOR``). Need not be contiguous.
 
         Raises:
@@ -199,10 +200,12 @@ class Extractor:
         pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Unnumbered):
-            quality = stages.record("quality", measure_quality_without_numbers(pyramid.level(1), found.cells))
+            has_pattern = found.reason not in (Reason.NO_COLOR, Reason.NO_PATTERN)
+            quality = measure_quality_without_numbers(pyramid.level(1), found.cells, has_pattern)
+            stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.reason, stages, quality), None)
         cells, numbering = found.cells, found.numbering
-        places = stages.record("place", merge_corners(cells, numbering, self._lattice, pyramid.size))
+        places = stages.record("place", merge_corners(cells, numbering, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
     def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:
@@ -222,7 +225,7 @@ class Extractor:
             pyramid: the image.
             numbered: the markers before refinement.
             stages: the record of the stages so far.
-            before: appearance of the image before, in a sequence.
+            before: appearance of the previous image of a sequence.
         """
         places, size = numbered.places, pyramid.size
         refined = stages.record("refine", self._refiner(pyramid, places, before))

@@ -15,7 +15,7 @@ class Schedule(NamedTuple):
         max_profile_rows: rows of pixels across each gridline at most, in the first round of profiles, and in the
             second one if no synthesis follows.
         reduction_blur_px: blur (sigma, px) down to which the image may be reduced; blurred images need no fine pixels.
-        sharp_blur_share: blur as a share of the edges, below which a second round of profiles takes the place of
+        sharp_blur_share: blur as a share of the edges, below which a second round of profiles replaces
             synthesis.
         steps: number of steps by synthesis at most, each over all markers.
         small_move: standard deviations, the typical move of markers in a step after which no step follows. A further

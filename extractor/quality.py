@@ -1,4 +1,4 @@
-"""How good an image is for reading: what somebody who sets a camera up can turn."""
+"""The quality of an image for reading: the properties that can be adjusted at a camera."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from extractor.frozen_record import FrozenRecord
 
-# Beyond these limits a property costs markers or precision; they only lead to hints, and decide nothing.
+# Beyond these limits a property reduces the number of markers or their precision. The limits give hints only.
 MIN_EDGE_PX = 8.0
 MAX_BLUR_SHARE = 0.2  # of an edge
 MAX_NOISE = 15.0  # gray levels of 255
@@ -20,7 +20,8 @@ class Quality(FrozenRecord):
     """The properties of one image by which its markers can be read, and a hint for each that limits them.
 
     A property that could not be measured is NaN. Where no marker was found, clipping is that of the whole image, and
-    contrast, evenness and edge are those of the cells that were found without a number.
+    contrast, evenness and edge are those of the found cells without numbers; the edge is NaN if these cells are no
+    pattern.
 
     Attributes:
         blur_px: sigma of the blur, pixel included, px.
@@ -43,7 +44,7 @@ class Quality(FrozenRecord):
 
     @property
     def hints(self) -> tuple[str, ...]:
-        """One sentence for each property that limits the result: its value, the limit, and what to do."""
+        """One sentence for each property that limits the result: value, limit, and remedy."""
         return tuple(text for limits, text in self._judged() if limits)
 
     def _judged(self) -> tuple[tuple[bool, str], ...]:

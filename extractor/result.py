@@ -1,4 +1,4 @@
-"""The result of extraction, and the reasons for finding little or nothing."""
+"""The result of extraction, and the reasons for few or no markers."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ class VirtualStatus(IntEnum):
 
 
 class Origin(StrEnum):
-    """The evidence that fixed where the numbering begins."""
+    """The evidence that fixed the start of the numbering."""
 
     WHITE = "white"  # the white cell
-    OUTLINE = "outline"  # the pattern's rim, as the white cell is hidden
-    PREVIOUS = "previous"  # the frame before, as the white cell is hidden
+    OUTLINE = "outline"  # the pattern's rim, because the white cell is hidden
+    PREVIOUS = "previous"  # the previous frame, because the white cell is hidden
 
 
 class Reason(StrEnum):
-    """Why nothing, or little, was found in an image."""
+    """Why no or few markers were found in an image."""
 
     NO_COLOR = "no_color"  # the image is grayscale, or one of the three inks is absent
     NO_PATTERN = "no_pattern"  # no triangles that meet as in a pattern
     REFERENCE_LOST = "reference_lost"  # a pattern whose white cell is not visible
     AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
-    SEVERAL_PADS = "several_pads"  # several white cells, each with the cells around it that a pattern has
+    SEVERAL_PADS = "several_pads"  # several white cells, each with the surrounding cells of a pattern
     OTHER_SIDE = (
-        "other_side"  # the pattern's other side, or red and blue are swapped: the inks do not tell which
+        "other_side"  # the other side, or red and blue are swapped: the inks do not distinguish the cases
     )
     MIRRORED = "mirrored"  # the pattern's other side, in inks of the palette's hues
     SWAPPED_CHANNELS = "swapped_channels"  # the inks have the palette's hues if red and blue are swapped
@@ -58,7 +58,7 @@ class Reason(StrEnum):
 
     @property
     def text(self) -> str:
-        """What it means and what to do, in one clause."""
+        """Meaning and remedy, in one clause."""
         return _REASON_TEXTS[self]
 
 
@@ -71,14 +71,14 @@ _REASON_TEXTS = {
     "with 8 px an edge or more",
     Reason.REFERENCE_LOST: "the white reference cell was not found; uncover or clean it, keep it in view, and check "
     "that the layout is the pattern's",
-    Reason.AMBIGUOUS: "the numbering is ambiguous: more than one cell could be the white one; remove glare and dirt, "
+    Reason.AMBIGUOUS: "the numbering is ambiguous: more than one cell could be the white cell; remove glare and dirt, "
     "and show the pattern around the white cell",
     Reason.SEVERAL_PADS: "several white cells agree with the cells around them; show one pad alone",
-    Reason.OTHER_SIDE: "the pattern is seen from the side that is not expected: a mirrored camera, the pad's other "
+    Reason.OTHER_SIDE: "the pattern is seen from another side than stated: a mirrored camera, the pad's other "
     "face, or an RGB image where BGR is expected; state side or channels",
-    Reason.MIRRORED: "the pattern is seen from the side that is not expected: by the hues of its inks a mirrored "
+    Reason.MIRRORED: "the pattern is seen from another side than stated: by the hues of its inks a mirrored "
     "camera or the pad's other face; state side, or turn the image or the pad",
-    Reason.SWAPPED_CHANNELS: "red and blue are swapped: with them exchanged, the side is the expected one and the "
+    Reason.SWAPPED_CHANNELS: "red and blue are swapped: with both exchanged, the side is the stated side and the "
     "inks have the layout's hues; state channels, or convert the image to BGR",
     Reason.FEW_MARKERS: "fewer than half of the visible markers were found; check focus, exposure and light, "
     "uncover or clean the pattern, and check that the layout is the pattern's",
@@ -97,11 +97,11 @@ class Markers(FrozenRecord):
         virtual_cov_px2: (E, m, 2, 2) float64, NaN where lost.
         virtual_status: (E, m) uint8, a ``VirtualStatus`` each: measured across the gridline (every virtual marker is
             interpolated along it), or interpolated only.
-        mirrored: whether the image shows the pattern's back; None when nothing was numbered.
-        reason: why nothing or little was found; None when all went well. ``FEW_MARKERS`` may come with markers.
+        mirrored: whether the image shows the pattern's back; None when no cell was numbered.
+        reason: why no or few markers were found; None without a problem. ``FEW_MARKERS`` may come with markers.
         timings_ms: stage name -> milliseconds, read-only.
         stages: stage name -> that stage's result, for debugging and drawing, read-only.
-        origin: the evidence that fixed the numbering; None when nothing was numbered.
+        origin: the evidence that fixed the numbering; None when no cell was numbered.
         quality: blur, noise, contrast, clipping, light and scale of the image; None when there was no color image.
     """
 
@@ -153,6 +153,6 @@ class Markers(FrozenRecord):
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What the reason says to do, and the hints of the quality; empty where neither has any."""
+        """The remedy of the reason, and the hints of the quality; empty without both."""
         reason = () if self.reason is None else (self.reason.text,)
         return reason + (() if self.quality is None else self.quality.hints)

@@ -2,7 +2,7 @@
 
 ``cmpdesign verify --report report.zip`` writes the report. Its pictures, layout and settings become the folder NAME in
 ``tests/extractor/reported/cases``, where ``test_reported.py`` beside that folder finds them: every picture must be
-verified. A picture of which something else must come out says so in ``case.json``, under "expected".
+verified. For a picture with another result, ``case.json`` states the result under "expected".
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def adopt(report: Path, name: str | None = None, cases: Path = CASES) -> Path:
         cases: the folder of all cases.
 
     Raises:
-        ReportError: the file is no report, holds files that it does not name, or the case is there already.
+        ReportError: the file is no report, holds files that it does not name, or the case exists already.
     """
     folder = cases / (name or report.stem)
     if folder.parent != cases or folder.name.startswith("."):
         raise ReportError(f"--name {name}: is no name of a folder")
     if folder.exists():
-        raise ReportError(f"{folder}: is there already; give another --name")
+        raise ReportError(f"{folder} exists already; give another --name")
     try:
         with zipfile.ZipFile(report) as bundle:
             if sum(info.file_size for info in bundle.infolist()) > MOST_BYTES:
@@ -49,7 +49,7 @@ def adopt(report: Path, name: str | None = None, cases: Path = CASES) -> Path:
             contents = {Path(file).name: bundle.read(file) for file in pictures}
             contents["layout.json"] = bundle.read("layout.json")
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise ReportError(f"{report}: is no report of a problem ({error})") from None
+        raise ReportError(f"{report} is no report of a problem ({error})") from None
     case = {
         "settings": document["settings"],
         "versions": document["versions"],

@@ -3,8 +3,8 @@
     .venv/bin/python tools/definition_hashes.py > before.txt     # then move code, and compare
     .venv/bin/python tools/definition_hashes.py | diff before.txt -
 
-Where a definition stands does not count, nor do the modules that it imports from: a move changes just these. Functions,
-classes and assignments count, with their comments left out and their docstrings kept.
+The place of a definition and the modules of its imports do not count: a move changes only these. Functions,
+classes and assignments count, without comments and with docstrings.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ FOLDERS = ("extractor", "cmpdesign", "benchmarks")
 
 
 class WithoutModules(ast.NodeTransformer):
-    """Takes away imports within a definition, and keeps the names that they bring."""
+    """Removes imports within a definition, and keeps the imported names."""
 
     def __init__(self) -> None:
         self.brought: set[str] = set()

@@ -1,11 +1,11 @@
-"""A frozen corpus: digests of what the programs make and read, to hold two states of the code against each other.
+"""A frozen corpus: digests of the programs' files and results, to compare two states of the code.
 
     .venv/bin/python tools/frozen_corpus.py before.txt     # on one commit
     .venv/bin/python tools/frozen_corpus.py after.txt      # on another one, on the same machine
     diff before.txt after.txt
 
 It builds every product of every template, renders scenes, extracts them with every preset, tracks, reconstructs and
-evaluates. Only documented names and commands are used, so that the code below them may move.
+evaluates. Only documented names and commands are used, so that the internal code may be moved.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ PRESETS = ("fast", "balanced", "accurate")
 
 
 def digest(value: Any) -> str:
-    """SHA-256 of an array, of bytes or of whatever has a text."""
+    """SHA-256 of an array, of bytes, or of a value's text."""
     if isinstance(value, np.ndarray):
         data = str((value.dtype.str, value.shape)).encode() + np.ascontiguousarray(value).tobytes()
     else:
@@ -187,7 +187,7 @@ def evaluations(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def without_times(value: Any) -> Any:
-    """A report without what differs from run to run."""
+    """A report without the values that differ from run to run."""
     if isinstance(value, dict):
         return {
             k: without_times(v) for k, v in value.items() if not k.endswith(("_ms", "_s", "digest", "code"))

@@ -2,7 +2,7 @@
 
     python -m tools.golden_markers
 
-The pictures stay as they are. The largest move of each picture and preset is printed for the commit's message.
+The pictures are not changed. The largest move of each picture and preset is printed for the commit's message.
 """
 
 from __future__ import annotations

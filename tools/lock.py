@@ -1,9 +1,9 @@
-"""Writes requirements.lock: the versions of all packages that are installed here, but for this one.
+"""Writes requirements.lock: the versions of all packages that are installed here, except for this package.
 
     python -m tools.lock
 
-It is a constraint file of pip: it names versions and installs nothing by itself. It holds no digests, because pip then
-refuses an editable package beside them, and every platform has wheels of its own.
+The file is a constraint file of pip: it names versions and installs no package. It has no digests, because pip then
+refuses an editable package, and because every platform has its own wheels.
 """
 
 from __future__ import annotations
@@ -13,14 +13,17 @@ from pathlib import Path
 
 LOCK_PATH = Path(__file__).parents[1] / "requirements.lock"
 HEADER = "# Versions that the tests ran with. Written by: make lock\n"
-OWN = {"cmpdesign", "pip"}
+# setuptools only builds packages without wheels. The version beside one Python fails on a later Python.
+LEFT_OUT = {"cmpdesign", "pip", "setuptools"}
 
 
 def lock_text() -> str:
     """One line NAME==VERSION for each installed package, in the order of the names."""
     versions = {one.metadata["Name"]: one.version for one in distributions()}
     lines = [
-        f"{name}=={versions[name]}\n" for name in sorted(versions, key=str.lower) if name.lower() not in OWN
+        f"{name}=={versions[name]}\n"
+        for name in sorted(versions, key=str.lower)
+        if name.lower() not in LEFT_OUT
     ]
     return HEADER + "".join(lines)
 

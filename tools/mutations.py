@@ -114,7 +114,7 @@ def path_of(module: str, root: Path) -> Path:
 
 
 def notices(place: Place, root: Path, limit_s: float) -> str:
-    """What the tests say of one fault: "noticed by ..." or "not noticed"."""
+    """The tests' result for one fault: "noticed by ..." or "not noticed"."""
     path = path_of(place.module, root)
     text = path.read_text(encoding="utf-8")
     path.write_text(broken(text, place), encoding="utf-8")

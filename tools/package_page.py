@@ -1,6 +1,6 @@
-"""The package's page: README with links and pictures by the project's address, and the addresses beside it.
+"""The package's page: README with links and pictures by the project's address, and the project's addresses.
 
-The build calls ``dynamic_metadata`` (``[tool.scikit-build.metadata]`` of pyproject.toml). It runs in an environment
+The build calls ``dynamic_metadata`` (``[tool.scikit-build.metadata]`` of pyproject.toml) in an environment
 without this package's libraries.
 """
 
@@ -47,7 +47,7 @@ def project_urls(address: str) -> dict[str, str]:
 
 
 def absolute_links(text: str, address: str) -> str:
-    """Markdown whose links and pictures to files of the project are whole addresses; links within the page stay."""
+    """Markdown whose links and pictures to files of the project are full addresses; links within the page are kept."""
 
     def whole(match: re.Match[str]) -> str:
         target = match[1]

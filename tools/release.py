@@ -1,9 +1,10 @@
-"""The checklist of a release: what a script can check is checked, the rest is printed. Nothing is published.
+"""The checklist of a release. The script checks all items that a script can check, and prints the others. Nothing is
+published.
 
     python -m tools.release [--python python3.12 ...] [--skip-tests]
 
 1. Version, changelog and citation agree, the changelog's heading has a date, and nothing is uncommitted.
-2. For every Python: a wheel is built in an empty environment, and installed with all extras into another one.
+2. For every Python: a wheel is built in an empty environment, and installed with all extras into another environment.
 3. From there, away from the sources, the tutorials and README are run.
 """
 
@@ -23,9 +24,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 OLDEST, NEWEST = 11, 14  # minor versions of Python 3 that are looked for
-# Of the extra [dev]: what runs the pages, and the other program that opens a recording in a tutorial.
+# Of the extra [dev]: the libraries that run the pages, and the program that opens a recording in a tutorial.
 TEST_NEEDS = ("pytest", "hypothesis", "mcap-ros2-support")
-# What the pages' tests need of the sources. Not the packages: these come from the wheel.
+# Files of the sources that the pages' tests need, without the packages: these come from the wheel.
 TESTED = (
     "tests",
     "docs",
@@ -46,7 +47,7 @@ BY_HAND = """Left to do by hand:
 
 
 def disagreements(root: Path) -> list[str]:
-    """What of version, changelog and citation does not agree; one line each."""
+    """Disagreements of version, changelog and citation; one line each."""
     version = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     package = _first(r'^__version__ = "([^"]+)"', root / "cmpdesign" / "__init__.py")
     citation = _first(r"^version: (\S+)", root / "CITATION.cff")
@@ -157,7 +158,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m tools.release", description=(__doc__ or "").split("\n")[0]
     )
-    parser.add_argument("--python", nargs="+", default=None, help="the Pythons; else all that are found")
+    parser.add_argument("--python", nargs="+", default=None, help="the Pythons; else all found Pythons")
     parser.add_argument(
         "--skip-tests", action="store_true", help="check version, changelog and citation only"
     )

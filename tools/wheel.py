@@ -2,7 +2,7 @@
 
     python -m tools.wheel [--processor x86_64|aarch64] [--folder dist]
 
-The compiler is that of the package ziglang. It is installed into this environment where it is missing.
+The compiler is that of the package ziglang, which is installed into this environment where it is missing.
 """
 
 from __future__ import annotations

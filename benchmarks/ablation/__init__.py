@@ -1,1 +1,1 @@
-"""``python -m benchmarks.ablation``: what each rule of the reader is worth."""
+"""``python -m benchmarks.ablation``: the effect of each rule of the reader."""

@@ -1,17 +1,19 @@
-"""What each rule of the reader is worth: every rule switched off in a copy of the reader, over the same pictures.
+"""The effect of each rule of the reader: every rule switched off in a copy of the reader, over the same pictures.
 
-    python -m benchmarks.ablation [--rule NAME ...] [--preset NAME] [--pictures N] [--seed S] [--json FILE]
+    python -m benchmarks.ablation [--rule NAME ...] [--together] [--preset NAME] [--pictures N] [--seed S]
 
 A rule for accuracy is tried on the suites plain, stress, damage, scatter and camera together; a rule whose purpose is
 that no wrong id is reported, on pictures made to provoke wrong ids. A rule stays if it saves a wrong id, or if without
 it wrong markers, lost markers or the RMS of measured markers rise by 2 % or more, with a paired 95 % interval above
-zero (bootstrap over pictures). Without a seed, that of the commit's hash is taken.
+zero (bootstrap over pictures). A rule for true errors or for time stays, too, if z goes as far from 1, or if the share
+of markers beyond three deviations or the processor time rise so. Without a seed, that of the commit's hash is taken.
 
 Wrong ids are at another marker's place, or in a picture without the pattern; wrong positions are more than half of the
 shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both
 are judged. Differences are "without the rule" minus "with it". z is of all reported markers, time the ratio of
-processor times. Rules in C++ need a compiler: every process builds a copy of the reader once, and for each such rule
-compiles the changed file.
+processor times. Two rules may replace each other: with ``--together`` all named rules are switched off at once, in
+the pictures of both kinds. Rules in C++ need a compiler: every process builds a copy of the reader once, and for each
+such rule compiles the changed file.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
 
+from benchmarks.ablation.report import comparison_row, publish
 from benchmarks.suites.ablation.comparison import Change, Comparison, compare
 from benchmarks.suites.ablation.pictures import POOLED, PROVOKING, KeptPicture, keep_pictures
 from benchmarks.suites.ablation.rule import Kind, Rule
@@ -35,12 +38,16 @@ from benchmarks.support.code_copy import CodeCopy
 from benchmarks.support.machine import conditions_text, write_json
 from extractor.presets import PRESETS
 
-SUITES: dict[Kind, tuple[str, ...]] = {"accuracy": POOLED, "no wrong id": (PROVOKING,)}
+SUITES: dict[Kind, tuple[str, ...]] = {
+    "accuracy": POOLED,
+    "errors and time": POOLED,
+    "no wrong id": (PROVOKING,),
+}
 PICTURES = 60  # of each suite
 HEAD = (
     f"{'rule':<22}{'stage':<11}{'kind':<13}{'pictures':>9}{'touched':>8}{'ids':>9}{'positions':>10}"
     f"{'lost':>8}{'difference, 95 %':>27}{'RMS px':>9}{'difference in %, 95 %':>27}{'typical':>9}"
-    f"{'difference in %, 95 %':>27}{'z':>12}{'time':>6}  verdict"
+    f"{'difference in %, 95 %':>27}{'z':>12}{'beyond %':>12}{'time':>6}  verdict"
 )
 
 
@@ -57,9 +64,9 @@ def scores_by_suite(
 def try_rules(
     rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str, processes: int
 ) -> Iterable[Comparison]:
-    """The comparison of each rule on the pictures of its kind, as soon as it is known, in the order of the rules.
+    """The comparison of each rule on the pictures of its kind, as soon as it is computed, in the order of the rules.
 
-    Each process has a copy of the reader for itself. If a rule is native, all copies are built from their sources.
+    Each process has its own copy of the reader. If a rule is native, all copies are built from their sources.
     """
     full: dict[str, list[PictureScore]] = {}
     idle: SimpleQueue[CodeCopy] = SimpleQueue()
@@ -68,13 +75,15 @@ def try_rules(
         own = [picture for picture in pictures if picture.suite in SUITES[rule.kind]]
         copy = idle.get()
         try:
+            # what else the machine does must not count: the time of the full reader is taken anew
+            before = scores_by_suite((), own, preset, copy) if rule.kind == "errors and time" else full
             without = scores_by_suite((rule,), own, preset, copy)
         finally:
             idle.put(copy)
         suites = list(without)
         return compare(
             rule,
-            [score for suite in suites for score in full[suite]],
+            [score for suite in suites for score in before[suite]],
             [score for suite in suites for score in without[suite]],
         )
 
@@ -88,6 +97,21 @@ def try_rules(
         yield from pool.map(try_rule, rules)
 
 
+def try_together(rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str) -> Iterable[Comparison]:
+    """For the suites of each kind, the comparison of the reader without all of the rules, named after the first."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = CodeCopy(Path(folder) / "copy")
+        if any(rule.change.is_native for rule in rules):
+            copy.build()
+        for kind in ("accuracy", "no wrong id"):
+            suites = SUITES[kind]
+            own = [picture for picture in pictures if picture.suite in suites]
+            full, without = (read_without(some, own, preset, copy) for some in ((), rules))
+            yield compare(
+                rules[0]._replace(name=f"{rules[0].name} + {len(rules) - 1}", kind=kind), full, without
+            )
+
+
 def comparison_line(found: Comparison) -> str:
     """The line of a rule below ``HEAD``."""
     return (
@@ -96,7 +120,8 @@ def comparison_line(found: Comparison) -> str:
         f"{found.lost.full:>8.0f}{_interval(found.lost, 1.0, 0):>27}"
         f"{found.rms_px.full:>9.4f}{_interval(found.rms_px, 100 / found.rms_px.full, 2):>27}"
         f"{found.typical_px.full:>9.4f}{_interval(found.typical_px, 100 / found.typical_px.full, 2):>27}"
-        f"{found.z[0]:>6.2f}>{found.z[1]:.2f}{found.time_ratio:>7.2f}  {found.verdict}"
+        f"{found.z[0]:>6.2f}>{found.z[1]:.2f}"
+        f"{100 * found.beyond.full:>7.2f}>{100 * found.beyond.without:.2f}{found.time_ratio:>7.2f}  {found.verdict}"
     )
 
 
@@ -110,12 +135,6 @@ def _interval(change: Change, unit: float, digits: int) -> str:
     return f"{value:+.{digits}f} [{low:+.{digits}f}, {high:+.{digits}f}]"
 
 
-def _row(found: Comparison) -> dict[str, object]:
-    changes = {name: getattr(found, name)._asdict() for name in ("wrong", "lost", "rms_px", "typical_px")}
-    named = {"rule": found.rule.name, "stage": found.rule.stage, "kind": found.rule.kind}
-    return {**found._asdict(), **changes, **named, "verdict": found.verdict}
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Draw the pictures, read them with the full reader and without each rule, print the table."""
     parser = argparse.ArgumentParser(
@@ -124,10 +143,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--rule", action="append", choices=tuple(BY_NAME), metavar="NAME", help="all by default"
     )
+    parser.add_argument("--together", action="store_true", help="switch the rules off all at once")
     parser.add_argument("--preset", choices=tuple(PRESETS), default="balanced")
     parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of each suite")
     parser.add_argument("--seed", type=int, metavar="S", help="of all random choices")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every row")
+    parser.add_argument("--publish", action="store_true", help="put the rows into docs/measured and its page")
     parser.add_argument("--processes", type=int, default=1, metavar="N", help="rules tried at the same time")
     parser.add_argument("--list", action="store_true", help="print the rules, try none")
     options = parser.parse_args(arguments)
@@ -141,10 +162,13 @@ def main(arguments: list[str] | None = None) -> int:
         seed = commit_seed() if options.seed is None else options.seed
     except ValueError as error:
         parser.error(str(error))
+    if options.together and options.publish:
+        parser.error("--together tells nothing of single rules; leave --publish out")
     if seed < 0:
         parser.error(f"--seed is {seed}; it must be 0 or more")
     started, found = time.perf_counter(), []
-    suites = list(dict.fromkeys(suite for rule in rules for suite in SUITES[rule.kind]))
+    kinds = list(SUITES) if options.together else [rule.kind for rule in rules]
+    suites = list(dict.fromkeys(suite for kind in kinds for suite in SUITES[kind]))
     with tempfile.TemporaryDirectory() as folder:
         pictures = [
             picture
@@ -152,13 +176,24 @@ def main(arguments: list[str] | None = None) -> int:
             for picture in keep_pictures(suite, options.pictures, seed, Path(folder))
         ]
         print(HEAD, flush=True)
-        for comparison in try_rules(rules, pictures, options.preset, options.processes):
+        comparisons: Iterable[Comparison] = (
+            try_together(rules, pictures, options.preset)
+            if options.together
+            else try_rules(rules, pictures, options.preset, options.processes)
+        )
+        for comparison in comparisons:
             found.append(comparison)
             print(comparison_line(comparison), flush=True)
     print(f"{len(pictures)} pictures, seed {seed}, {options.preset}; {time.perf_counter() - started:.0f} s")
     print(conditions_text())
+    rows = [comparison_row(comparison) for comparison in found]
     if options.json:
-        write_json(options.json, {"seed": seed, "rows": [_row(comparison) for comparison in found]})
+        write_json(options.json, {"seed": seed, "rows": rows})
+    if options.publish:
+        named = "".join(f' --rule "{name}"' for name in options.rule or ())
+        command = f"python -m benchmarks.ablation --preset {options.preset} --pictures {options.pictures} --seed {seed}"
+        for path in publish(rows, command + named):
+            print(f"wrote {path}")
     return 0
 
 

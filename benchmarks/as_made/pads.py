@@ -55,12 +55,12 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors of M markers and what is stated of them; NaN rows are of markers that are not measured.
+    """Errors of M markers and their stated covariances; NaN rows are of markers that are not measured.
 
     Attributes:
         error: (M, 2).
         squared: (M,) d2 of the errors by their stated covariances.
-        bound: (M,) mean variance per axis by the exact bound; NaN where there is none.
+        bound: (M,) mean variance per axis by the exact bound; NaN without a bound.
     """
 
     error: Points
@@ -108,12 +108,12 @@ def reference_of(layout: Layout) -> Reference:
 
 
 def learn_pad(pad: Pad) -> LearntLayout:
-    """What the pad's pictures tell of its nominal layout."""
+    """The layout learnt from the pad's pictures and its nominal layout."""
     return learn_layout(reference_of(pad.nominal), [shot.image for shot in pad.pictures])
 
 
 def place_errors(pad: Pad, learnt: LearntLayout) -> Errors:
-    """Errors of the learnt places, mm: the true places are brought nearest to the nominal ones, too."""
+    """Errors of the learnt places, mm: the true places are mapped nearest to the nominal places, too."""
     seen, as_made = learnt.measured, learnt.layout.as_made
     assert as_made is not None and as_made.covariance_mm2 is not None
     common, _ = cv2.findHomography(pad.made.marker_xy_mm[seen], pad.nominal.marker_xy_mm[seen])

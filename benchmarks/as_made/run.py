@@ -1,15 +1,15 @@
-"""Displacements on pads whose markers are scattered: read with the nominal layout, with the learnt, with the true one.
+"""Displacements on pads whose markers are scattered: read with the nominal, with the learnt and with the true layout.
 
     python -m benchmarks.as_made [--quick] [--scatter-px S] [--pads N] [--seed S] [--json FILE]
 
 Every marker of a pad is moved by a normal scatter, in px per axis at edges of 20 px. Twelve pictures of the pad at
-rest, each in a pose of its own (any turn, tilts up to 25 degrees, edges of 18 to 21 px), tell the layout as made.
+rest, each in a different pose (any turn, tilts up to 25 degrees, edges of 18 to 21 px), give the learnt layout.
 Other pictures show the pad at rest, and then pressed and twisted before a camera that has not moved. "position" is of
 the markers in the picture of the contact, "displacement" is the difference of the two readings. The pictures are those
 of the standard scene: 640 x 480 px, blur 1 px, sRGB, noise 2/255. "/ bound" is the RMS error over the exact Cramer-Rao
 bound of free markers. z is the RMS error over the stated covariance per axis: 1 is right. The places are those of the
 learnt layout, in um. All figures are pooled over patterns and pads; 95 % intervals are by bootstrap over pictures.
-Without a seed, it comes from the commit's hash.
+The default seed comes from the commit's hash.
 """
 
 from __future__ import annotations

@@ -3,11 +3,11 @@
     python -m benchmarks.calibration [--quick] [--preset NAME] [--suite NAME] [--seed S] [--json FILE]
 
 For an error e and its stated covariance C, d2 = e' C^-1 e. z = sqrt(mean d2 / 2) and median z = sqrt(median d2 /
-(2 ln 2)) are 1 for a right covariance, above 1 for one too small; "beyond" is the share of d2 above 11.83, 0.27 % for
-normal errors with that covariance. Intervals are of 95 %, by bootstrap over pictures. All reported markers count, wrong
-ones included. Rows are of measured markers and virtual markers by kind of picture; of each suite together, also of
-repaired and fitted markers and of interpolated virtual markers. Without a seed, that of the camera suite comes from the
-commit's hash, and that of all others is 0. All are printed.
+(2 ln 2)) are 1 for a right covariance, above 1 for a covariance that is too small; "beyond" is the share of d2 above
+11.83, 0.27 % for normal errors with that covariance. Intervals are of 95 %, by bootstrap over pictures. All reported
+markers count, wrong ones included. Rows are of measured markers and virtual markers by kind of picture; of each suite
+together, also of repaired and fitted markers and of interpolated virtual markers. The default seed of the camera suite
+comes from the commit's hash, the default of the other suites is 0. All seeds are printed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What fails, as pictures: files with overlays, and the part of docs/explanation/hard-cases.md that ``--page`` writes.
+"""Pictures that fail: files with overlays, and the part of docs/explanation/hard-cases.md that ``--page`` writes.
 
-The page is made from docs/measured/camera.json alone: its pictures are made again from their seed, and what the reader
-found in them is kept in the file. So the page can be drawn again without reading.
+The page is made from docs/measured/camera.json alone: its pictures are made again from their seed, and the reader's
+results are stored in the file. The page can therefore be drawn again without reading.
 """
 
 from __future__ import annotations
@@ -67,14 +67,14 @@ def shown_results(results: Sequence[PictureResult]) -> list[PictureResult]:
 
 
 def _severity(result: PictureResult) -> float:
-    """Exceptions before wrong ids before wrong positions before lost markers before errors beyond the stated ones."""
+    """Exceptions before wrong ids before wrong positions before lost markers before errors above the stated errors."""
     lost = 1.0 - result.measured_share
     beyond = 1e-3 * picture_z(result) if result.right else 0.0
     return 1e6 * result.raised + 1e3 * result.wrong_ids + 10 * result.wrong_places + lost + beyond
 
 
 def shown_record(result: PictureResult) -> dict[str, Any]:
-    """What the page needs of a picture."""
+    """The values of a picture for the page."""
     z = picture_z(result)
     return {
         "number": result.case.number,
@@ -130,7 +130,7 @@ def page_pictures() -> dict[str, bytes]:
 
 
 def failures_picture(measured: Mapping[str, Any]) -> bytes:
-    """JPEG of a sheet: the shown pictures with lost and wrong markers, and what was read in them."""
+    """JPEG of a sheet: the shown pictures with lost and wrong markers, and the reader's result."""
     tiles = [_tile(CameraCase(measured["seed"], entry["number"]), entry) for entry in measured["shown"]]
     blank = np.full((TILE_PX[1] + CAPTION_PX, TILE_PX[0], 3), PAPER_BGR, dtype=np.uint8)
     tiles += [blank] * (-len(tiles) % COLUMNS or (COLUMNS if not tiles else 0))
@@ -181,7 +181,7 @@ def marked_picture(picture: CameraPicture, outcomes: str) -> NDArray[np.uint8]:
 
 
 def save_pictures(results: Sequence[PictureResult], preset: Preset, folder: Path) -> None:
-    """Write the pictures of results, and overlays of what the reader finds in them, into a folder."""
+    """Write the pictures of results, and overlays of the reader's results, into a folder."""
     from extractor.draw import draw_markers
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -3,8 +3,9 @@
     python -m benchmarks.camera [--pictures N] [--seed S] [--preset P] [--table] [--json FILE] [--page]
     python -m benchmarks.camera --seed S --only "exposure=0.75/72" --save DIR     one picture and its overlay
 
-Without a seed, the commit's hash gives one; it is printed. The same seed gives the same pictures. Each effect has
-strengths of 0.25 to 1; the hardest are 0.1 or 8 times the light, 13 px of motion, JPEG at quality 15 and alike.
+The default seed comes from the commit's hash and is printed. The same seed gives the same pictures. Each effect has
+strengths of 0.25 to 1; the largest strengths are 0.1 or 8 times the light, 13 px of motion, JPEG at quality 15 and
+similar.
 Columns: the share of visible markers measured; wrong ids (reported at another marker's place) and wrong positions
 (error above 0.3 of the shortest edge); RMS error per axis of measured markers that are not wrong; z, median z and the
 share beyond of all measured markers, wrong ones included, with its interval; processor time of one picture, the

@@ -1,1 +1,1 @@
-"""``python -m benchmarks.codecs``: how far the compression of video moves markers."""
+"""``python -m benchmarks.codecs``: errors of markers by the compression of video."""

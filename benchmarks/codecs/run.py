@@ -1,4 +1,4 @@
-"""How far the compression of video moves markers: frames that were compressed, read beside the same frames as PNG.
+"""Errors of markers by the compression of video: compressed frames, compared with the same frames as PNG.
 
     python -m benchmarks.codecs [--quick] [--json FILE]
 
@@ -55,7 +55,7 @@ CODECS: Mapping[str, tuple[str, Codec]] = {
 
 @dataclass(frozen=True)
 class CodecResult:
-    """What a codec does to the markers of a sequence; lengths in px per axis, RMS unless named otherwise."""
+    """The errors of a codec for the markers of a sequence; lengths in px per axis, RMS unless named otherwise."""
 
     codec: str
     moved_px: float
@@ -70,7 +70,7 @@ class CodecResult:
 
 @dataclass(frozen=True)
 class Coded:
-    """Frames after their way through a codec, the file's size in kB and the time to encode in ms, both a frame."""
+    """Frames after compression by a codec, the file's size in kB and the time to encode in ms, both per frame."""
 
     images: list[NDArray[np.uint8]]
     kb: float
@@ -90,7 +90,7 @@ def encode_and_decode(images: Sequence[NDArray[np.uint8]], name: str, folder: Pa
     with require_av().open(str(path)) as container:
         decoded = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
     if len(decoded) != len(images):
-        raise RuntimeError(f"{name}: {len(decoded)} of {len(images)} frames came back")
+        raise RuntimeError(f"{name}: {len(decoded)} of {len(images)} frames were decoded")
     return Coded(decoded, path.stat().st_size / 1e3 / len(images), ms)
 
 
@@ -103,7 +103,7 @@ def png_files(images: Sequence[NDArray[np.uint8]]) -> Coded:
 
 
 def rms(values: NDArray[np.float64]) -> float:
-    """Root mean square of what is known."""
+    """Root mean square of the known values."""
     return float(np.sqrt(np.nanmean(values**2)))
 
 

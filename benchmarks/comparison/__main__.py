@@ -1,14 +1,14 @@
-"""Speed against error: our presets, what else finds such corners, and the article's way, on the same scenes.
+"""Speed against error: the presets, other detectors of corners, and the article's method, on the same scenes.
 
     python -m benchmarks.comparison [--quick] [--response srgb|linear] [--json FILE] [--publish]
 
 640 x 480 px, edges of 20 px, rotated by 7.3 degrees, blur 1 px in light, sRGB, noise 2/255 after it: honeycomb with 397
 markers flat, tilted by 35 degrees, bulged, twisted, blurred by 1.6 px, with edges of 13 px; round and elliptical
 patterns flat. Detectors of checkerboards read a board of 400 inner corners with the same edge length, camera, surface
-and response, in black and white only, as gray image. Bounds are the exact ones of the encoded picture.
+and response, in black and white only, as a gray image. Bounds are the exact bounds of the encoded picture.
 One thread each, processor time. The repetitions of all methods alternate, each with its own noise. Before every timed
 frame a method reads another frame, not timed, as in a stream. The article's method is in plain Python where no stage of
-ours does the same, so its time is an upper bound.
+the extractor does the same, so its time is an upper bound.
 
 The pooled table is over three patterns, flat, with edges of 13 px, tilted, bulged and twisted, at blurs of 1 and
 1.6 px; boards have no patterns. RMS of all markers' errors over RMS of their exact bounds, and the same over "inner"

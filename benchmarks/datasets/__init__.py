@@ -1,1 +1,1 @@
-"""How fast data sets are made and read, and how large they are."""
+"""Speed and size of data sets."""

@@ -1,13 +1,13 @@
-"""How fast data sets are made and read, on one and on two workers, and how large they are.
+"""Speed of making and reading data sets, on one and on two workers, and the size of data sets.
 
     python -m benchmarks.datasets [--quick] [--json FILE] [--publish]
 
-"rendered": the shipped plan pressed-objects: every frame is drawn, its contact solved, rendered, encoded as JPEG and
+"rendered": the plan template pressed-objects: every frame is drawn, its contact solved, rendered, encoded as JPEG and
 read. "extracted": the same pictures as videos (FFV1, 640 x 480 px), decoded and read. Frames a second are those of the
 whole command, the start of its workers included; "efficiency" is the rate on two workers over twice that on one. Core
-milliseconds a frame depend little on what else the machine does; "in core time" is that on one worker over that on two.
-Sizes are those of the shards' files. "start" and "a shard without work" are what a scheduler takes itself. The sum for
-10 million frames multiplies core time and sizes; its prices are assumptions, stated beside it.
+milliseconds a frame depend little on other load of the machine; "in core time" is the core time on one worker over that
+on two. Sizes are those of the shards' files. "start" and "a shard without work" are times of the scheduler itself. The
+estimate for 10 million frames multiplies core time and sizes; its prices are assumptions, stated beside it.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class Spent:
-    """What work took: time, and the time of all cores, of this process and of its workers."""
+    """The time of some work: time, and the time of all cores, of this process and of its workers."""
 
     seconds: float
     core_seconds: float
@@ -111,7 +111,7 @@ def rates_of(what: str, frames: int, one: Spent, two: Spent) -> Rates:
 
 
 def small_plan(folder: Path, shards: int) -> Path:
-    """The shipped plan with few frames."""
+    """The plan template with few frames."""
     text = find_plan("pressed-objects").read_text(encoding="utf-8")
     lines = [
         f"frames = {shards * FRAMES_A_SHARD}"

@@ -1,4 +1,4 @@
-"""How far shapes of linear contacts may be believed.
+"""Errors of the shapes of linear contacts.
 
-In: a ball that presses. Out: a table of its shapes beside those of a neo-Hookean layer.
+In: a ball that presses. Out: a table of its shapes compared with those of a neo-Hookean layer.
 """

@@ -75,7 +75,7 @@ def _coupling(u: Any, q: Any, w: Any) -> Any:
 
 
 def _ball(u: Any, w: Any) -> tuple[Array, Array, Array]:
-    """How far the surface is inside the ball, and the ball's slope and curvature there."""
+    """Depth of the surface inside the ball, and the ball's slope and curvature there."""
     at = w.x[0] + u[0]
     root = np.sqrt(RADIUS_MM**2 - np.minimum(at, 0.9 * RADIUS_MM) ** 2)
     return np.maximum(u[1] - (RADIUS_MM - root - w["press"]), 0.0), at / root, RADIUS_MM**2 / root**3

@@ -1,4 +1,4 @@
-"""Linear contacts beside the neo-Hookean layer, press by press."""
+"""Linear contacts compared with the neo-Hookean layer, press by press."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Comparison(NamedTuple):
         press_mm: the press.
         strain: ``Contact.largest_strain``.
         first_order_mm: of the surface, whose z is read where points were at rest.
-        surface_mm: of the surface, as ``Contact.surface`` gives it.
-        markers_mm: of the pattern, as ``Contact.marker_layer`` gives it.
+        surface_mm: of the surface by ``Contact.surface``.
+        markers_mm: of the pattern by ``Contact.marker_layer``.
         height_mm: of the surface in z alone, at the same place in space.
-        volume_lost: what the first-order surface loses, over the dent's volume.
+        volume_lost: volume that the first-order surface loses, over the dent's volume.
         volume_lost_now: the same of ``Contact.surface``.
     """
 
@@ -43,7 +43,7 @@ class Comparison(NamedTuple):
 
 
 def compare(press_mm: float, moved: Moved) -> Comparison:
-    """The linear contact beside the neo-Hookean one."""
+    """The linear contact compared with the neo-Hookean layer."""
     contact = solve(
         LAYER, Ball(RADIUS_MM), Motion(press_mm), friction=0.0, size_mm=(SOLVED_MM, SOLVED_MM), grid=256
     )

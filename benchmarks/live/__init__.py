@@ -1,1 +1,1 @@
-"""``python -m benchmarks.live``: what live viewers and files cost, and whether a queue grows."""
+"""``python -m benchmarks.live``: time of live viewers and files per frame, and growth of the queue."""

@@ -1,9 +1,9 @@
-"""A viewer in a process of its own, for ``benchmarks.live``: a client of Foxglove's websocket protocol.
+"""A viewer in a separate process, for ``benchmarks.live``: a client of Foxglove's websocket protocol.
 
     python -m benchmarks.live.client PORT [--stalled]
 
-It subscribes to all channels, reads until the server stops, and prints the number of clouds of markers that it got.
-With --stalled it subscribes, and reads nothing more until its input ends.
+The client subscribes to all channels, reads until the server stops, and prints the number of received clouds of
+markers. With --stalled the client subscribes, and does not read until its input ends.
 """
 
 from __future__ import annotations

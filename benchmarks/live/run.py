@@ -1,10 +1,11 @@
-"""What live viewers and files cost a frame, and what a queue holds over a minute at 120 frames a second.
+"""Time of live viewers and files per frame, and the length of the queue during a minute at 120 frames a second.
 
     python -m benchmarks.live [--quick] [--json FILE]
 
 60 frames of 640 x 480 px (quick: 12), 331 markers, are tracked with the preset "balanced"; then every file and every
-live viewer takes them. "ms" is the processor's time of all threads for one frame, to the complete file; "of tracking"
-its ratio to the processor's time that tracking takes, in the same run. "held up" is the time that the tracker waits.
+live viewer receives them. "ms" is the processor's time of all threads for one frame, to the complete file; "of
+tracking" its ratio to the processor's time that tracking takes, in the same run. "held up" is the time that the tracker
+waits.
 
 A minute (quick: 5 s) at 120 frames a second into Foxglove's server, with a client in a process of its own that reads,
 and with one that does not: frames sent, left out before the server, and seen by the client; the largest number of
@@ -49,7 +50,7 @@ VIEWERS = ("foxglove", "rerun")
 
 @dataclass(frozen=True)
 class Cost:
-    """What an output costs a frame; times in ms."""
+    """Time of an output per frame, in ms."""
 
     output: str
     ms: float
@@ -85,7 +86,7 @@ def track_frames(count: int) -> Material:
     layout = standard_layout()
     images = [one.image for one in islice(render_sequence(layout, count, jerky=False), count)]
     reference = parse_layout(layout_to_json(layout))
-    Tracker(reference).track(images[0])  # what is loaded and compiled at first use
+    Tracker(reference).track(images[0])  # code that is loaded and compiled at first use
     tracker = Tracker(reference)
     started = time.process_time()
     frames = [tracker.track(image, time_s=k / 30) for k, image in enumerate(images)]
@@ -117,7 +118,7 @@ def costs(material: Material) -> list[Cost]:
 
 
 def resident_mb() -> float:
-    """The memory of this process; nan where the system does not tell."""
+    """The memory of this process; nan where the system does not state it."""
     try:
         return int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]) * 4096 / 1e6
     except OSError:

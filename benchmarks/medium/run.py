@@ -1,15 +1,16 @@
-"""Depth through a window and a gel: with true constants, with wrong ones, and as if there were air.
+"""Depth through a window and a gel: with true constants, with wrong constants, and with air assumed.
 
     python -m benchmarks.medium [--quick] [--seed N] [--json FILE]
 
 Every rig is drawn at random: two views behind the pattern, 25 to 60 mm away and 15 to 22 degrees to either side, 2 to 5
 mm of gel, a window of 2 to 3 mm of acrylic or glass. The pattern fills the same share of the image in all of them. A
 ball is pressed in by 0.3 to 1 mm and sheared by up to 0.2 mm. Images are rendered through the medium and read; poses
-come from a rest frame of its own, so that a wrong constant acts on both. Depth errors are those of the displacement
+come from a separate rest frame, so that a wrong constant acts on both. Depth errors are those of the displacement
 along z, over the markers that move by more than half of the press. "mean error" is the mean of their absolute values,
-"bias" their absolute mean, both per frame; "short" is by how much smaller the displacement reads, by least squares; z
-is the RMS of the errors of positions and of displacements over their covariances. A wrong constant is taken with both
-signs. The window that is tilted by 1 degree is tilted in the images, and parallel to the pattern for the reader.
+"bias" their absolute mean, both per frame; "short" is the share by which the measured displacement is too small, by
+least squares; z is the RMS of the errors of positions and of displacements over their covariances. A wrong constant is
+taken with both signs. The window that is tilted by 1 degree is tilted in the images, and parallel to the pattern for
+the reader.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The stress suite: how much is read, and how much of it wrong, in every condition of ``suites.stress``.
+"""The stress suite: shares of read and of wrong markers in every condition of ``suites.stress``.
 
     python -m benchmarks.stress [--quick] [--table] [--json FILE] [--plot FILE]
     python -m benchmarks.stress --only "blur=3/round" --save DIR     some cases: their images and overlays

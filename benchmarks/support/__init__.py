@@ -1,1 +1,1 @@
-"""What several benchmarks share: the machine, scenes, scan lines, published figures."""
+"""Shared modules of the benchmarks: the machine, scenes, scan lines, published figures."""

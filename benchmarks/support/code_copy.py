@@ -45,7 +45,7 @@ def replaced_text(text: str, change: Replacement) -> str:
 def environment(folder: Path) -> dict[str, str]:
     """The environment of a process that imports the packages of a folder and the benchmarks of this checkout.
 
-    No bytecode is written: of a text that is replaced and put back within a second it would be taken for valid.
+    No bytecode is written: bytecode of a text that is replaced and restored within a second would be taken for valid.
     """
     path = os.pathsep.join((str(folder), str(ROOT)))
     return {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
@@ -67,7 +67,7 @@ class CodeCopy:
         self._tree = folder / "tree"
 
     def build(self) -> None:
-        """Build the reader's native module from the copied sources; later only of what has changed since.
+        """Build the reader's native module from the copied sources; later builds compile changed files only.
 
         Raises:
             RuntimeError: the build failed.
@@ -79,7 +79,7 @@ class CodeCopy:
 
     @contextmanager
     def replaced(self, changes: Iterable[Replacement]) -> Iterator[None]:
-        """Replace texts for as long as the context lasts. A native module once built is always that of the texts.
+        """Replace texts within the context. A native module that was built always corresponds to the texts.
 
         Raises:
             ValueError: a text to be replaced does not occur exactly once.

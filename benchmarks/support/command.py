@@ -1,4 +1,4 @@
-"""What the commands of benchmarks have in common: their options and the width of their tables."""
+"""Shared by the commands of benchmarks: options and the width of tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def publishing_parser(name: str, document: str | None, quick: str) -> argparse.A
     Args:
         name: of the benchmark.
         document: its docstring, whose first line is the description.
-        quick: what a quick run has few of.
+        quick: the items of which a quick run has few.
     """
     description = (document or "").split("\n")[0]
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=description)
@@ -27,6 +27,6 @@ def publishing_parser(name: str, document: str | None, quick: str) -> argparse.A
 
 
 def wide_console(width: int) -> Console:
-    """The terminal, or of this many columns where there is none: a pipe has no width, and tables would be cut."""
+    """The terminal, or this number of columns without a terminal: a pipe has no width, and tables would be cut."""
     terminal = Console()
     return terminal if terminal.is_terminal else Console(width=width)

@@ -31,9 +31,9 @@ def replace_blocks(text: str, blocks: Mapping[str, str]) -> str:
         before, _, rest = text.partition(begin)
         _, ends, after = rest.partition(end)
         if not ends:
-            raise ValueError(f"the block {name} has no end; put {end!r} where it shall end")
+            raise ValueError(f"the block {name} has no end; write {end!r} at its end")
         if begin in after:
-            raise ValueError(f"the block {name} stands there twice; remove one")
+            raise ValueError(f"the block {name} occurs twice; remove one of them")
         text = f"{before}{begin}\n\n{lines.strip()}\n\n{end}{after}"
     return text
 

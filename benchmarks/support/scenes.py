@@ -1,4 +1,4 @@
-"""The scenes of stated figures of accuracy, and the checkerboard that other detectors read in them."""
+"""The scenes of stated figures of accuracy, and the checkerboard for other detectors in the same scenes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class SceneCase:
 
     @property
     def name(self) -> str:
-        """The pattern's name; of honeycomb patterns the kind of scene, or what is unusual in a flat one."""
+        """The pattern's name; for honeycomb patterns the kind of scene, or the changed parameter of a flat scene."""
         if self.pattern != "honeycomb":
             return self.pattern
         if self.kind == "flat" and self.blur_px != STANDARD_BLUR_PX:

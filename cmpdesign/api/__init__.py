@@ -1,4 +1,4 @@
-"""The calls behind the commands, by the same names: what ``import cmpdesign`` offers.
+"""The calls behind the commands, by the same names: the public names of ``import cmpdesign``.
 
 In: names of templates, paths, images, options. Out: designs, layouts, verdicts, runs, files.
 """

@@ -22,7 +22,7 @@ def dataset(
     scheduler: str = "local",
     workers: int | None = None,
 ) -> DataSet:
-    """Make a data set, as the command ``dataset`` does; an interrupted one goes on.
+    """Make a data set, as the command ``dataset`` does; the same call continues an interrupted data set.
 
     A program that calls this with the scheduler "local" needs ``if __name__ == "__main__":`` around its work, because
     every worker is a new process.
@@ -32,8 +32,8 @@ def dataset(
 
     Args:
         plan: a TOML file, or the name of a plan template.
-        output: a new folder, or one of the same plan.
-        shards: the first N shards, or "A:B", those from A to below B; None: all.
+        output: a new folder, or the folder of a data set of the same plan.
+        shards: the first N shards, or "A:B", the shards from A to below B; None: all.
         scheduler: "local", or "dask=ADDRESS", the address of a dask scheduler or its scheduler file.
         workers: processes on this machine; None: one for each core.
 
@@ -71,9 +71,9 @@ def extract(
 
     Args:
         layout: see ``track``.
-        sources: videos, folders of pictures, patterns such as "run*/*.mp4"; each frame is read by itself.
-        output: a new folder, or one of the same sources.
-        frames_a_shard: frames of a shard; a video is cut at the next key frame.
+        sources: videos, folders of pictures, patterns such as "run*/*.mp4"; each frame is read independently.
+        output: a new folder, or the folder of a data set of the same sources.
+        frames_a_shard: number of frames in a shard; a video is cut at the next key frame.
         scheduler, workers: see ``dataset``.
         reading: preset, response, side, channels; see ``extractor.Extractor``.
 

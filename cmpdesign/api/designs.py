@@ -29,13 +29,13 @@ class Design(Parameters):
     >>> design = cmpdesign.load("tac3d", layers=8)        # a template, or a TOML file, with values changed
     >>> design = cmpdesign.Design(pattern="honeycomb", layers=8, pitch_mm="60mil")
     >>> design.layout                                     # every marker, cell and edge; a notebook draws it
-    >>> design.check()                                    # what cannot be made or read
+    >>> design.check()                                    # the features that cannot be made or read
     >>> design.write("out")                               # pattern.svg, layout.json, preview.png, report.json
     >>> design.write("out", products=["laser", "mold"])   # a laser job, a casting mold
     >>> design.changed(layers=9)                          # another design; this one does not change
 
-    Every parameter is an attribute, such as ``design.pitch_mm``; docs/reference/design-files.md has them all. Lengths
-    are in mm, or texts such as "60mil". A size is given as ``pitch_mm`` and ``layers``; ``width_mm`` and/or
+    Every parameter is an attribute, such as ``design.pitch_mm``; docs/reference/design-files.md lists all parameters.
+    Lengths are in mm, or texts such as "60mil". A size is given as ``pitch_mm`` and ``layers``; ``width_mm`` and/or
     ``height_mm`` and ``layers``; these and ``pitch_mm``; or ``pitch_mm`` and a clip outline.
 
     Raises:
@@ -54,7 +54,7 @@ class Design(Parameters):
         return cls.model_construct(set(parameters.model_fields_set), **values)
 
     def changed(self, **changes: Any) -> Design:
-        """A design with other values; None takes a value back, as in ``design.changed(layers=None, width_mm=30)``.
+        """A design with other values; None removes a value, as in ``design.changed(layers=None, width_mm=30)``.
 
         Raises:
             DesignError: the values contradict each other.
@@ -79,7 +79,7 @@ class Design(Parameters):
         return design_report(self, self.layout)
 
     def check(self, camera: tuple[int, int] = CAMERA_PX, *, read: bool = False) -> Checked:
-        """What cannot be made or read, as the command ``check`` says it.
+        """The features that cannot be made or read, as in the command ``check``.
 
         Args:
             camera: width and height in px of the camera whose picture the pattern fills.
@@ -98,11 +98,11 @@ class Design(Parameters):
         Args:
             folder: folder for the files; made if missing. Files of earlier builds that do not belong to this design
                 are removed, unless they were changed.
-            products: what to make: of svg, layout, preview, report, laser, mold, mesh, print.
+            products: products to make: svg, layout, preview, report, laser, mold, mesh, print.
             camera: see ``check``; pads of lasers, molds and prints are read as this camera sees them.
 
         Raises:
-            CmpDesignError: an unknown product, or one that cannot be made; nothing is written.
+            CmpDesignError: an unknown product, or a product that cannot be made; no file is written.
             OutputError: a file cannot be written.
         """
         names = products if isinstance(products, str) else ",".join(products)
@@ -135,7 +135,7 @@ class Design(Parameters):
         return f"<div><b>{escape(self.name or self.pattern)}</b><br>{drawing}<table>{cells}</table></div>"
 
 
-# Without this, ``help(Design)`` begins with three screens of the validators of its parameters.
+# Without this line, ``help(Design)`` begins with three screens of the validators of its parameters.
 Design.__signature__ = inspect.Signature(
     [inspect.Parameter("parameters", inspect.Parameter.VAR_KEYWORD, annotation=Any)]
 )
@@ -149,7 +149,7 @@ def load(
     Args:
         name_or_path: a template's name ("tac3d"; ``cmpdesign.templates()`` lists them) or the path of a TOML file.
         overrides: values by name, as after ``--set``; "laser.kerf_mm" names a value of a table.
-        changes: the same as keywords: ``load("tac3d", layers=8, laser={"kerf_mm": 0.14})``. None takes a value back.
+        changes: the same as keywords: ``load("tac3d", layers=8, laser={"kerf_mm": 0.14})``. None removes a value.
 
     Raises:
         DesignError: no such template or file, not TOML, or a parameter that ``Design`` refuses.
@@ -161,7 +161,7 @@ def load(
 
 
 def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Design:
-    """``load`` by its name in version 0.1."""
+    """``load`` under its name in version 0.1."""
     return load(name_or_path, overrides)
 
 
@@ -171,7 +171,7 @@ def schema() -> dict[str, Any]:
 
 
 def templates() -> dict[str, Design]:
-    """The shipped designs by name, as the command ``templates`` lists them.
+    """The design templates by name, as the command ``templates`` lists them.
 
     >>> templates()["tac3d"].layers
     10

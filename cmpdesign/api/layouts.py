@@ -1,4 +1,4 @@
-"""Layouts as programs use them: handed to the reader, written, shown in a notebook."""
+"""Layouts for programs: for the reader, for files, for notebooks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Layout(layouts.Layout):
 
     >>> layout = cmpdesign.load("tac3d").layout
     >>> Extractor(layout).extract(image)                  # the reader takes a layout
-    >>> layout.marker_xy_mm[217], layout.size_mm          # read-only arrays; a marker's place in them is its id
+    >>> layout.marker_xy_mm[217], layout.size_mm          # read-only arrays; the index in the array is the marker's id
     >>> layout.write("layout.json")
 
     The attributes are those of ``layout.json``: marker_layer, marker_index (M,) int32; marker_xy_mm (M, 2) float64;
@@ -37,7 +37,7 @@ class Layout(layouts.Layout):
         return cls(**{item.name: getattr(layout, item.name) for item in fields(layout)})
 
     def reference(self) -> Reference:
-        """The layout as the reader has it: for ``Extractor``, ``Tracker`` and all else of ``extractor``."""
+        """The reader's value of the layout: for ``Extractor``, ``Tracker`` and the other classes of ``extractor``."""
         return self._reference
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Pictures drawn of a pattern, and pictures judged: ``render`` and ``verify`` of the command line."""
+"""Rendering of a pattern, and verdicts on pictures: ``render`` and ``verify`` of the command line."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ SIZE_PX = (640, 480)
 
 
 class View(TypedDict, total=False):
-    """What a plain picture shows; the names are those of scene files.
+    """The properties of a plain picture; the names are the names in scene files.
 
     Keys:
         pitch_px: pixels from marker to marker; 20.
         rotation_deg: counter-clockwise turn in the image; 0.
         tilt_deg, tilt_axis_deg: tilt out of the image plane, and the direction of its axis; 0.
         mirrored: the camera sees the back; None: as designed.
-        press_mm: how far a press at the centre moves the markers; 0.
+        press_mm: largest displacement of the markers by a press at the centre; 0.
         press_radius_mm: radius of the press; None: a quarter of the pattern.
         blur_px: Gaussian blur, sigma; 1.
         noise: standard deviation in 255ths; 0.
-        response: how light becomes values: "srgb", "linear", or the exponent of light = value ** exponent; "srgb".
+        response: relation of light and values: "srgb", "linear", or the exponent of light = value ** exponent; "srgb".
     """
 
     pitch_px: float
@@ -83,7 +83,7 @@ def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[Vi
 
     unknown = sorted(view.keys() - _USUAL.keys())
     if unknown:
-        raise TypeError(f"{unknown[0]} is no name of a view; there are {', '.join(_USUAL)}")
+        raise TypeError(f"{unknown[0]} is no property of a view; there are {', '.join(_USUAL)}")
     pattern, chosen = layout_from(layout), View(**{**_USUAL, **view})
     radius_mm = chosen["press_radius_mm"]
     if radius_mm is None:
@@ -116,7 +116,7 @@ def load_scene(
     Args:
         name_or_path: name ("pressed-ball") or path.
         layout: see ``plain_scene``.
-        size, seed: (width, height) in px and seed, in place of the file's.
+        size, seed: (width, height) in px and seed, instead of the file's.
 
     Raises:
         CmpDesignError: no such scene, or a value that cannot be rendered.
@@ -135,7 +135,7 @@ def render(
     seed: int | None = None,
     **view: Unpack[View],
 ) -> Rendered:
-    """Draw a pattern as a camera sees it, with the exact truth, as the command ``render`` does.
+    """Draw a camera's picture of a pattern, with the exact truth, as the command ``render`` does.
 
     >>> rendered = cmpdesign.render(layout, pitch_px=22, rotation_deg=12, tilt_deg=15, noise=2, seed=1)
     >>> rendered.image, rendered.truth.marker_xy_px       # (H, W, 3) uint8 BGR; (M, 2) px
@@ -203,15 +203,15 @@ def render_sequence(
 
 @dataclass(frozen=True, eq=False)
 class Verifier:
-    """Judges pictures of one pattern; the reader is made once.
+    """Gives verdicts on pictures of one pattern; the reader is made once.
 
     Attributes:
         reference: the layout.
         min_share: share of the visible markers that must be measured, 0 to 1.
-        response: how light became values, see ``extractor.Extractor``.
+        response: relation of light and values, see ``extractor.Extractor``.
         channels: "bgr" or "rgb", the order of a picture's colors.
-        sheet_dpi: the pictures are print sheets of this resolution, whatever files say; 0: unknown; None: pictures
-            that show the code of a print sheet are judged as such.
+        sheet_dpi: the pictures are print sheets of this resolution, instead of the files' own; 0: unknown; None:
+            pictures that show the code of a print sheet are judged as such.
         max_pixels: largest picture that is read from a file, width x height.
         preset: see ``extractor.Extractor``.
     """
@@ -226,7 +226,7 @@ class Verifier:
 
     @cached_property
     def extractor(self) -> Extractor:
-        """The reader; it is made when the first picture needs it."""
+        """The reader; made for the first picture."""
         from extractor import Extractor
 
         return Extractor(self.reference, self.preset, self.response, "either")
@@ -246,7 +246,9 @@ class Verifier:
         return pixels[:, :, ::-1].copy() if self.channels == "rgb" else pixels
 
     def judge(self, image: NDArray[Any], path: Path | None = None) -> Verdict | SheetVerdict:
-        """The verdict on a picture that ``read`` returns; ``path``: its file, which may state the resolution."""
+        """The verdict on a picture that ``read`` returns; ``path``: the picture's file, which may state the
+        resolution.
+        """
         from cmpdesign.products.sheet.verdict import judge_sheet
         from cmpdesign.reading.verify import verify as judge_pattern
 
@@ -292,7 +294,7 @@ def verify(
     Args:
         layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
         image: a file, or (H, W, 3) uint8 or uint16.
-        report: file (.zip) that bundles picture, layout, settings and stages: what to send with a picture that is not
+        report: file (.zip) that bundles picture, layout, settings and stages, to send with a picture that is not
             read; None: no file.
         options: see ``Verifier``.
 

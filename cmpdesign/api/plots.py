@@ -52,11 +52,11 @@ def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = F
 
 
 def plot_markers(image: NDArray[Any], markers: Markers, ax: Any = None) -> Any:
-    """Draw the markers of a picture over it: measured, repaired and fitted ones in their own colors.
+    """Draw the markers over a picture: measured, repaired and fitted markers in different colors.
 
     Args:
         image: (H, W, 3) BGR, uint8 or uint16.
-        markers: what ``Extractor.extract`` found in it.
+        markers: the result of ``Extractor.extract`` for the picture.
         ax: matplotlib axes; None: new ones.
 
     Returns:
@@ -84,7 +84,7 @@ def plot_displacement(run: Run, frame: int = -1, ax: Any = None, *, magnified: f
     """Draw the displacements of one frame of a recording as arrows from the places at rest, in mm.
 
     Args:
-        run: what ``load_run`` returns.
+        run: the result of ``load_run``.
         frame: its place in the run; -1: the last frame.
         ax: matplotlib axes; None: new ones.
         magnified: factor of the arrows' length.
@@ -116,10 +116,10 @@ def plot_displacement(run: Run, frame: int = -1, ax: Any = None, *, magnified: f
 
 
 def plot_history(run: Run, markers: list[int] | None = None, ax: Any = None) -> Any:
-    """Draw how far markers moved over time.
+    """Draw the markers' displacements over time.
 
     Args:
-        run: what ``load_run`` returns.
+        run: the result of ``load_run``.
         markers: ids; None: median and largest displacement of all markers.
         ax: matplotlib axes; None: new ones.
 

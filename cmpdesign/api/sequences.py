@@ -39,12 +39,12 @@ class ReadingOptions(TypedDict, total=False):
     Keys:
         fps: frames per second; None: a video's own, 30 for a folder.
         frames: stop after this many frames; None: at the source's end.
-        cold: never start from the frame before; False.
+        cold: number every frame without the previous frame; False.
         preset, response, side, channels: see ``extractor.Extractor``.
         max_pixels: largest image that is read, width x height.
         frame_id: coordinate frame and first part of the topics of a recording; "tactile".
-        with_images: also record, or show live, the frames' images; False.
-        live: also show the frames while the run goes on, by "foxglove" or "rerun"; None.
+        with_images: also record the frames' images, or show them live; False.
+        live: also show the frames during the run, by "foxglove" or "rerun"; None.
         live_port, live_wait_s: see ``Live``; None and 0.
     """
 
@@ -113,8 +113,8 @@ class Followed:
         output: the table or recording; ``cmpdesign.load_run`` reads an .npz file.
         written: all files that were written, ``output`` first.
         summary: the JSON object of the summary beside it; empty if no frame could be read.
-        ended_early: why the run ended before the source's end; "" if it did not.
-        warnings: what makes the results doubtful.
+        ended_early: why the run ended before the source's end; "" for a complete run.
+        warnings: reasons to doubt the results.
     """
 
     output: Path
@@ -142,7 +142,7 @@ def track(
     >>> run = cmpdesign.load_run("run.npz")
     >>> run.arrays["displacement_mm"].shape               # (F, M, 2)
 
-    For the markers of each frame as they come, without a file, use ``cmpdesign.open_source`` and ``extractor.Tracker``.
+    For markers frame by frame without a file, use ``cmpdesign.open_source`` and ``extractor.Tracker``.
 
     Args:
         layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
@@ -150,7 +150,7 @@ def track(
         output: table (.npz, .parquet, .csv), or recording (.mcap; without ending a rosbag2 folder).
         rest: number of the frame at rest, or an image; None: the first tracked frame.
         mm_per_px: scale for mm along the image's axes; None: mm in the layout's frame.
-        overlay: video of what was found (.mp4, .avi, .mkv).
+        overlay: video of the found markers (.mp4, .avi, .mkv).
         quiver: picture (.png) with arrows of the frame with the largest displacement.
         watch: called with every ``extractor.Tracked``.
         reading: see ``ReadingOptions``.
@@ -195,7 +195,7 @@ def reconstruct(
         source: see ``open_source``; for several cameras a sequence with one for each view.
         output: see ``track``.
         watch: called with every ``extractor.ShapeFrame``.
-        shape: what is reconstructed, and from what.
+        shape: options of the surface, see ``ShapeOptions``.
         reading: see ``ReadingOptions``.
 
     Raises:
@@ -224,7 +224,7 @@ def open_source(source: AnySource, fps: float | None = None, max_pixels: int = M
     Args:
         source: path of a picture, of a folder of pictures or of a video, a pattern such as "run*/*.png", a camera's
             number, a stream ("rtsp://..."), or a sequence of pictures, folders and patterns.
-        fps: frames per second of a folder (default 30), or in place of a video's own rate.
+        fps: frames per second of a folder (default 30), or instead of a video's own rate.
         max_pixels: largest frame that is read, width x height.
 
     Raises:
@@ -239,7 +239,7 @@ def load_run(path: str | Path) -> Run:
     """Read an .npz file of ``track`` or ``reconstruct``.
 
     Raises:
-        CmpDesignError: the file cannot be read, is none of these, or holds no frame.
+        CmpDesignError: the file cannot be read, is no file of these commands, or holds no frame.
     """
     from cmpdesign.tracking.export.runs import read_run
 
@@ -251,9 +251,9 @@ class ShapeOptions:
     """Options of ``reconstruct`` that concern the surface.
 
     Attributes:
-        from_rest: place all views by the rest frame, also those whose pose the rig gives.
-        flatness_mm: how far the markers may lie off the plane at rest.
-        model_px: what the camera model leaves open; None: as the rest frame says.
+        from_rest: place all views by the rest frame, also the views whose pose the rig gives.
+        flatness_mm: standard deviation of the markers from the plane at rest.
+        model_px: error of the camera model; None: from the rest frame.
         surface: also give the touched surface, by the [elastomer] of the rig.
 
     Raises:
@@ -274,7 +274,7 @@ class ShapeOptions:
 
 @dataclass(frozen=True, eq=False)
 class TrackJob:
-    """What ``track`` needs; ``overlay`` and ``quiver`` are files to draw, the others as for ``track``."""
+    """The inputs of ``track``; ``overlay`` and ``quiver`` are files to draw, the other fields as for ``track``."""
 
     layout: Reference
     source: tuple[str, ...]
@@ -331,7 +331,7 @@ class TrackJob:
         return found
 
     def pictures(self, run: TrackingRun) -> dict[Path, bytes]:
-        """The quiver plot, if one is wanted and a frame has a displacement."""
+        """The quiver plot, if a plot is wanted and a frame has a displacement."""
         farthest, rest = run.statistics.farthest, run.tracker.rest
         if self.quiver is None or farthest is None or rest is None:
             return {}
@@ -343,7 +343,7 @@ class TrackJob:
 
 @dataclass(frozen=True, eq=False)
 class ReconstructJob:
-    """What ``reconstruct`` needs; ``rest`` and ``source`` are lists with commas for several cameras."""
+    """The inputs of ``reconstruct``; ``rest`` and ``source`` are lists with commas for several cameras."""
 
     layout: Reference
     rig: Path
@@ -423,7 +423,7 @@ class ReconstructJob:
             rests = rests * len(sources)
         if len(rests) != len(sources):
             raise CmpDesignError(
-                f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give as many of both"
+                f"REST lists {len(rests)} pictures, SOURCE {len(sources)}; give the same number of both"
             )
         images = [
             read_rest_image(rest, name, self.reading.fps, self.reading.max_pixels)
@@ -452,7 +452,7 @@ def follow(job: Job, watch: Watch) -> Followed:
 
 
 def write_summary(run: TrackingRun, job: Job) -> Followed:
-    """Write the summary beside the table of a run that has ended, and the quiver plot; nothing if no frame was read.
+    """Write the summary beside the table of a run that has ended, and the quiver plot; no file if no frame was read.
 
     Raises:
         OutputError: a file cannot be written.

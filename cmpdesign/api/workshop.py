@@ -1,4 +1,4 @@
-"""What is measured of one machine, one pad, one sensor: ``kerf``, ``calibrate``, ``evaluate`` of the command line."""
+"""Measurements of one machine, one pad, one sensor: ``kerf``, ``calibrate``, ``evaluate`` of the command line."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def kerf(
     Args:
         coupon: the coupon.json that a build wrote.
         photo: photo or scan of the cut piece.
-        face: face of the sheet whose openings are seen; None: the narrower one by the taper.
-        response: how light became values; None: as the file states, else sRGB, corrected by the edges.
+        face: face of the sheet whose openings are seen; None: the face with the narrower openings, by the taper.
+        response: relation of light and values; None: the response in the file, else sRGB, corrected by the edges.
         max_pixels: largest image that is read, width x height.
 
     Raises:
@@ -73,7 +73,7 @@ def calibrate_pattern(
     response: Response | None = None,
     max_pixels: int = MOST_PIXELS,
 ) -> LearntLayout:
-    """Measure where the markers of one pad were made, as the command ``calibrate pattern`` does.
+    """Measure the places of one pad's markers, as the command ``calibrate pattern`` does.
 
     >>> made = cmpdesign.calibrate_pattern("layout.json", "at_rest/", "made.json")
     >>> extractor.Extractor("made.json")                  # reads this pad with its own places
@@ -82,7 +82,7 @@ def calibrate_pattern(
         layout: the nominal layout: a layout, the path of a layout file, a ``Reference``, or its JSON object.
         images: 10 or more color pictures of one pad at rest: files, folders of files, patterns such as "rest/*.png",
             or arrays (H, W, 3) BGR.
-        output: layout file to write, with the places as made; None: none.
+        output: layout file to write, with the measured places; None: none.
         preset, response: see ``extractor.Extractor``.
         max_pixels: largest image that is read, width x height.
 
@@ -101,7 +101,7 @@ def calibrate_pattern(
         and isinstance(layout, str | Path)
         and Path(output).resolve() == Path(layout).resolve()
     ):
-        raise CmpDesignError(f"{output}: is the nominal layout itself; give another name")
+        raise CmpDesignError(f"{output} is the nominal layout itself; give another name")
     names, pictures = _read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
     learnt = learn_layout(
         reference_from(layout),
@@ -153,12 +153,12 @@ def run_experiment(
 
     Args:
         experiment: the command's name.
-        output: folder for report.html, report.json and the journal; an interrupted run goes on where it stopped.
+        output: folder for report.html, report.json and the journal; the same call continues an interrupted run.
         designs: name -> design; for "designs" only.
-        trials: places for every contact, object or mode; None: as the command has it.
-        seed: of everything random.
+        trials: places for every contact, object or mode; None: the command's default.
+        seed: seed of all random values.
         workers: processes; None: one for each core.
-        sensor: name of a shipped sensor, or a TOML file.
+        sensor: name of a sensor template, or a TOML file.
         preset: the reader's preset: "fast", "balanced" or "accurate".
 
     Returns:
@@ -197,10 +197,10 @@ def export_lerobot(
     """Write runs as a LeRobotDataset v3.0, as the command ``export lerobot`` does.
 
     Args:
-        runs: .npz files of ``track`` or ``reconstruct``; each is an episode.
+        runs: .npz files of ``track`` or ``reconstruct``; each file is an episode.
         output: data set to write; a new folder.
-        task: what the runs show, in words.
-        fps: frames per second; None: as the runs' times say.
+        task: task that the runs show, in words.
+        fps: frames per second; None: from the runs' times.
         robot: type of the robot; None: none.
         images: video or folder of images of each run, in order; empty: no images.
         max_pixels: largest image that is read, width x height.
@@ -249,7 +249,7 @@ def export_zarr(
 
 
 def _paths(runs: Sequence[str | Path]) -> list[Path]:
-    """The files; one name alone would be taken apart into letters.
+    """The files; a single name would be split into letters.
 
     Raises:
         CmpDesignError: one name instead of a list.

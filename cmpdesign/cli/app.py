@@ -23,7 +23,7 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # markup would swallow what stands in brackets in a help text
+    rich_markup_mode=None,  # markup would remove text in brackets from a help text
     help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.\n\n"
     "Exit codes: 0 done; 1 done, with a negative verdict or an early end; 2 bad input, or a file that cannot be "
     "written; 130 stopped by Ctrl-C.",

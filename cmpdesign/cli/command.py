@@ -1,4 +1,4 @@
-"""What all commands share: options of output, examples, refused paths, and errors and Ctrl-C as one line."""
+"""Shared by all commands: options of output, examples, refused paths, and one line for errors and for Ctrl-C."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Command(TyperCommand):
         _write_examples(self.epilog, formatter)
 
     def get_help(self, ctx: Any) -> str:
-        """The help text without the types of arguments, which are Python's, as in "SOURCE <list[str]>"."""
+        """The help text without Python's types of arguments, as in "SOURCE <list[str]>"."""
         return _ARGUMENT_TYPE.sub(lambda found: found[1] + " " * len(found[2]), super().get_help(ctx))
 
     def invoke(self, ctx: Any) -> Any:
@@ -86,7 +86,8 @@ class OneLineErrors(Group):
     """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130."""
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
-        use_mode(Mode(as_json=_asks_for_json(args)))  # for errors in the words, before options are known
+        # for errors in the command line, before the options are known
+        use_mode(Mode(as_json=_asks_for_json(args)))
         try:
             return super().make_context(info_name, args, parent, **extra)
         except Exception as error:
@@ -120,7 +121,7 @@ def _asks_for_json(words: Sequence[str]) -> bool:
 
 
 def _finish_usage_error(error: Exception) -> None:
-    """Of an error in the words, which quotes them: make its message printable, or print it as JSON and exit."""
+    """Make the message of an error in the command line printable, or print the message as JSON and exit."""
     if not hasattr(error, "format_message"):
         return
     message = error.format_message()

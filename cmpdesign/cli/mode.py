@@ -1,4 +1,4 @@
-"""How the running command prints: as text or as JSON, all of it or errors and warnings only."""
+"""The output of the running command: text or JSON; everything, or errors and warnings only."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Mode(NamedTuple):
     Attributes:
         as_json: one JSON document on stdout, errors and warnings as JSON lines on stderr.
         quiet: errors and warnings only.
-        verbose: each step with its time on stderr, and where an error arose.
+        verbose: each step with its time on stderr, and the place in the code where an error arose.
     """
 
     as_json: bool = False

@@ -13,14 +13,14 @@ from cmpdesign.inputs.texts import visible
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-# Rates are means over this time; the trials of an experiment take up to a minute.
+# Rates are means over this time; a trial of an experiment takes up to a minute.
 SPEED_PERIOD_S = 300.0
 Advance = Callable[[str], None]
 
 
 @contextmanager
 def progress_bar(doing: str, total: int | None, *, done: int = 0, unit: str = "") -> Iterator[Advance]:
-    """A progress bar that vanishes at its end.
+    """A progress bar that is removed at its end.
 
     Args:
         doing: text before the bar.
@@ -45,13 +45,13 @@ def progress_bar(doing: str, total: int | None, *, done: int = 0, unit: str = ""
 
 
 class Steps:
-    """Steps one after another, each with a bar of its own as soon as the number of its parts is known."""
+    """Steps one after another; each step has a bar as soon as the number of its parts is known."""
 
     def __init__(self, progress: Progress | None) -> None:
         self._progress = progress
 
     def begin(self, doing: str) -> None:
-        """A step begins; the last state of the step before is still shown, however short this step was."""
+        """Begin a step; the last state of the previous step is shown, also of a very short step."""
         if self._progress is not None:
             self._progress.refresh()
             for task in self._progress.task_ids:
@@ -59,7 +59,7 @@ class Steps:
             self._progress.add_task(visible(doing), total=None, note="", rate="")
 
     def tell(self, done: int, total: int, unit: str) -> None:
-        """Of the step's parts, so many are done; see ``cmpdesign.watch``."""
+        """Show how many of the step's parts are done; see ``cmpdesign.watch``."""
         if self._progress is not None and self._progress.task_ids:
             task = self._progress.task_ids[-1]
             self._progress.update(task, completed=done, total=total)
@@ -68,7 +68,7 @@ class Steps:
 
 @contextmanager
 def working(doing: str) -> Iterator[Steps]:
-    """Progress of work in steps; they vanish at the end. The first step is ``doing``."""
+    """Progress of work in steps; the bars are removed at the end. The first step is ``doing``."""
     with _progress() as progress:
         steps = Steps(progress)
         steps.begin(doing)
@@ -76,7 +76,7 @@ def working(doing: str) -> Iterator[Steps]:
 
 
 def _rate(progress: Progress, unit: str, before: int = 0) -> str:
-    """The rate of the last task, of which an earlier run did ``before`` parts; Rich has none for the first part."""
+    """The rate of the last task, of which an earlier run did ``before`` parts; Rich has no rate for the first part."""
     task = progress.tasks[-1]
     speed = task.finished_speed or task.speed
     if speed is None and task.elapsed:

@@ -41,7 +41,7 @@ def run_with_progress(run: TrackingRun, doing: str) -> None:
 
 
 def _report_live(count: LiveCount) -> None:
-    """Print what viewers did not get."""
+    """Print the number of frames that viewers did not receive."""
     if count.failure:
         print_warning(f"the live server stopped after {count.sent} frames ({count.failure})")
     if count.left_out:
@@ -50,7 +50,10 @@ def _report_live(count: LiveCount) -> None:
             "there was no time to send them"
         )
     if count.is_viewer_behind:
-        print_warning("a live viewer read more slowly than frames came, and was not sent all of them")
+        print_warning(
+            "a live viewer read more slowly than the frames were made; some frames were not sent to the "
+            "viewer"
+        )
 
 
 def exit_status(run: TrackingRun) -> int:
@@ -64,15 +67,15 @@ def exit_status(run: TrackingRun) -> int:
     if not run.statistics.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     if run.ended_early:
-        print_warning(f"{run.ended_early}; these are written")
+        print_warning(f"{run.ended_early}; the frames until then are written")
     return EXIT_NOT_TRACKED if run.ended_early or not run.statistics.tracked else 0
 
 
 def recover_and_report(output: Path, rows_per_frame: int) -> None:
-    """Complete the table of a killed run, and print what was recovered and what was not; exit with 1 for nothing.
+    """Complete the table of a killed run, and print the numbers of recovered and lost frames; exit with 1 for none.
 
     Raises:
-        CmpDesignError: there is nothing to recover, or no whole frame is left.
+        CmpDesignError: there is no table to recover, or no complete frame is left.
         OutputError: the table cannot be written.
     """
     from cmpdesign.cli.documents.runs import RecoverDocument

@@ -1,7 +1,7 @@
-"""Output to the terminal for all commands. No other module prints: a test holds this.
+"""Output to the terminal for all commands. No other module prints; a test checks this rule.
 
-Texts of files, paths and options are foreign: they may hold escape sequences that move the cursor, change the title of
-the window or hide what was printed. ``visible`` replaces them, and every function here calls it.
+Texts of files, paths and options come from others. They may hold escape sequences that move the cursor, change the
+title of the window or hide what was printed. ``visible`` replaces them, and every function here calls it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 MOST_LINE_LETTERS = 300  # of an error or a warning
-_HEAD_LETTERS = 200  # of them before the cut; the remedy stands at the end of a line
+_HEAD_LETTERS = 200  # letters before the cut; the remedy stands at the end of a line
 _STARTED = time.perf_counter()
 
 
@@ -48,7 +48,7 @@ def console(stderr: bool = False) -> Console:
     from rich.console import Console
 
     class VisibleConsole(Console):
-        """Shows the unprintable characters of every text that it is given, also in the cells of tables."""
+        """Makes the unprintable characters of every printed text visible, also in the cells of tables."""
 
         def render_str(self, text: str, **options: Any) -> Any:
             return super().render_str(visible(text, keep="\n"), **options)
@@ -57,7 +57,7 @@ def console(stderr: bool = False) -> Console:
 
 
 def is_expected(error: BaseException) -> bool:
-    """True for errors that either package raises on purpose; does not import the extractor."""
+    """True for errors that one of the packages raises on purpose; the function does not import the extractor."""
     from_extractor = sys.modules.get("extractor.errors")
     if from_extractor is not None and isinstance(error, from_extractor.ExtractorError):
         return True
@@ -80,7 +80,7 @@ def print_warning(text: str) -> None:
 
 
 def print_step(text: str) -> None:
-    """Print what was done on stderr, with the time since the start, if the command is verbose."""
+    """Print a finished step on stderr, with the time since the start, if the command is verbose."""
     if current_mode().verbose:
         _print_message(
             "step", f"{shortened(visible(text))} ({1e3 * (time.perf_counter() - _STARTED):.0f} ms)"
@@ -88,7 +88,7 @@ def print_step(text: str) -> None:
 
 
 def print_origin(error: BaseException) -> None:
-    """Print where an error arose on stderr, if the command is verbose."""
+    """Print the place in the code where an error arose on stderr, if the command is verbose."""
     if current_mode().verbose and not current_mode().as_json:
         sys.stderr.write(visible("".join(traceback.format_exception(error)), keep="\n"))
 
@@ -139,14 +139,16 @@ def _writing_output() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno == errno.EPIPE:  # the reader, as head, has enough; click ends the program
+        if (
+            error.errno == errno.EPIPE
+        ):  # the reading program, as head, has closed the pipe; click ends the program
             raise
         discard_output()
         raise OutputError(f"standard output: cannot be written ({error.strerror or error})") from None
 
 
 def discard_output() -> None:
-    """Write the rest of standard output to nowhere: Python would try again, and fail again, at its end."""
+    """Discard the rest of standard output: Python would try to write the rest at exit, and fail again."""
     with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
@@ -155,7 +157,7 @@ def finish(make_document: Callable[[], Document], exit_code: int = 0) -> None:
     """End a command: print its document with ``--json``, and exit with its code.
 
     Args:
-        make_document: makes the document; it is called with ``--json`` only.
+        make_document: makes the document; called with ``--json`` only.
         exit_code: the command's exit code.
 
     Raises:

@@ -3,8 +3,8 @@
 The elastic layer is loaded at its surface only. Loads with Gaussian profiles on a grid over the pattern, with unknown
 tractions, move both the pattern and the surface (``elastic_layer.patch_response``). The tractions are taken as
 independent normal deviates of one standard deviation, which is estimated from the pattern's displacement by maximum
-likelihood; the surface's displacement is then the mean of a normal distribution, and its covariance says what the noise
-and the layer's decay leave open (Rasmussen and Williams 2006, eq. 2.25, 2.26 and 5.8).
+likelihood; the surface's displacement is then the mean of a normal distribution, whose covariance contains the noise
+and the layer's decay (Rasmussen and Williams 2006, eq. 2.25, 2.26 and 5.8).
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from cmpdesign.contact.errors import require
 from cmpdesign.libraries import extra
 
 Array = NDArray[np.float64]
-# In units of the distance of neighbouring markers, between loads. Coarser loads understate what an edge leaves open.
+# Distance of loads, in units of the distance of neighbouring markers. Coarser loads understate the uncertainty at an
+# edge.
 LOAD_SPACING = 0.4
 LOAD_WIDTH = 0.8  # in units of the spacing of the loads; their sum is then uniform to 1 %
 LOAD_MARGIN = 1.5  # in units of the distance of neighbouring markers, of loads beyond the pattern
@@ -121,7 +122,7 @@ def _likeliest_variance(seen: Array, noise: Array, values: Array) -> float:
         spread = np.exp(log_variance) * scale + 1.0
         return float((projected / spread + np.log(spread)).sum())
 
-    # between tractions that do not show in the noise and those that explain all values with a factor to spare
+    # from tractions below the noise to tractions above all values
     high = np.log(max(float(projected.sum()), 1.0) / scale.max())
     low = np.log(1e-6 / scale.max())
     best = minimize_scalar(cost, bounds=(low, high + 12.0), method="bounded")

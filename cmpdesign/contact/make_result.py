@@ -30,7 +30,7 @@ def contact_from_state(problem: ContactProblem, state: ContactState, young_mpa: 
     grid, traction, displacement = problem.grid, state.traction_mpa, state.displacement_mm
     strain = largest_strain(problem.elastomer, displacement, traction, grid.step_mm)
     friction = np.hypot(traction[0], traction[1])
-    # Without friction nothing is carried along: wherever the object is, it presses only.
+    # Without friction the object moves no point sideways: it presses at every position.
     press_only = problem.friction == 0 or not state.motion.tangential
     by_press = displacement[:2] if press_only else state.press_displacement_mm
     markers, markers_by_press = displacement, by_press
@@ -69,7 +69,7 @@ def _contact_moment(problem: ContactProblem, state: ContactState) -> Array:
     """(3,) moment in N mm about the object's current centre, with lever arms in the plane of the flat surface.
 
     The tractions are those of linear theory, in the directions of the flat layer, and so are the arms: a twist turns
-    neither. Both move with the centre of pressure, so that a sheared object takes its load along.
+    neither. Both move with the centre of pressure, so that the load of a sheared object moves with the object.
     """
     centre = np.add(problem.indenter.centre_mm, state.motion.shear_mm)
     force = state.traction_mpa * problem.grid.step_mm**2
@@ -86,7 +86,7 @@ def _contact_warnings(problem: ContactProblem, state: ContactState, strain: floa
     if not state.in_contact.any():
         if state.motion.press_mm > 0:
             yield (
-                "the object touches nothing in the solved area; move centre_mm, take a larger size_mm or a finer grid, "
+                "the object does not touch the solved area; move centre_mm, take a larger size_mm or a finer grid, "
                 "or press more"
             )
         return
@@ -127,8 +127,8 @@ def _grid_warnings(problem: ContactProblem, touched: NDArray[np.bool_]) -> Itera
     at_edge = np.count_nonzero(touched) - np.count_nonzero(touched[1:-1, 1:-1])
     if at_edge:
         yield (
-            f"the contact reaches the edge of the solved area in {at_edge} cells: nothing is touched "
-            "beyond it, though the layer goes on; take a larger size_mm or a smaller object"
+            f"the contact reaches the edge of the solved area in {at_edge} cells: no contact is computed "
+            "beyond the edge, where the layer continues; take a larger size_mm or a smaller object"
         )
 
 

@@ -21,10 +21,11 @@ class Contact:
     Attributes:
         x_mm, y_mm: the cells' centres, (nx,) and (ny,).
         displacement_mm: displacement of the surface's points, (ny, nx, 3).
-        press_displacement_mm: the part of it in x and y that the press made, without shear and twist, (ny, nx, 2).
+        press_displacement_mm: the part of the displacement in x and y by the press, without shear and twist, (ny, nx,
+            2).
         marker_displacement_mm: displacement of the points of the pattern, (ny, nx, 3); without a marker depth the
             surface's.
-        marker_press_displacement_mm: the press's part of it, (ny, nx, 2).
+        marker_press_displacement_mm: the part by the press, (ny, nx, 2).
         traction_mpa: traction of the object on the surface, (ny, nx, 3); z is minus the pressure.
         in_contact: (ny, nx) bool.
         slipping: in contact and at the friction limit, (ny, nx) bool.
@@ -65,10 +66,11 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """A deformed surface or pattern: maps (N, 2) mm of the flat one to (N, 3) mm, by bicubic splines of displacements.
+    """A deformed surface or pattern: maps (N, 2) mm of the flat surface to (N, 3) mm, by bicubic splines of
+    displacements.
 
-    The solver reads the object's height in the place of a point, and its z is a height over that place. So z is read
-    where the press has moved a point: the surface touches the object, and no volume is lost. Read at the point's
+    The solver reads the object's height at the place of a point, so z is a height over this place. Therefore z is read
+    at the moved place of a point: the surface touches the object, and no volume is lost. Read at the point's
     place at rest, z is of first order only; a press by a ball then seems to lose a tenth of the dent's volume and more.
 
     Beyond the solved area the displacement falls smoothly to zero within one thickness (at least 6 cells).

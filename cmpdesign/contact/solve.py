@@ -66,7 +66,7 @@ def solve_path(
     size_mm: tuple[float, float] = (30.0, 30.0),
     grid: int = 256,
 ) -> Iterator[Contact]:
-    """Solve one contact for each motion, each by one increment from the contact before.
+    """Solve one contact for each motion, each by one increment from the previous contact.
 
     Motions may be in any order, for example deeper and back. Stick and slip depend on the order. The other arguments
     are those of ``solve``.

@@ -1,7 +1,7 @@
 """Data sets larger than a machine: many shards of rendered frames, or of frames read from videos.
 
 In: a plan (TOML), or videos and a layout; processes of this machine, or the workers of a dask cluster. Out: a folder of
-shards: images as WebDataset tar, truth, markers and parameters as Parquet; ``load`` reads it.
+shards: images as WebDataset tar, truth, markers and parameters as Parquet; ``load`` reads the folder.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["DataSet", "Frame", "load"]
 
 
 def __getattr__(name: str) -> Any:
-    """Load the reader at its first use: it needs pyarrow."""
+    """Load the reader at its first use: the reader needs pyarrow."""
     if name not in __all__:
         raise AttributeError(f"module 'cmpdesign.data' has no attribute {name!r}")
     return getattr(import_module("cmpdesign.data.reader"), name)

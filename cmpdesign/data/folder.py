@@ -1,16 +1,17 @@
 """The folder of a data set: its plan, one record for each finished shard, and the manifest.
 
-    plan.json              all that the frames depend on, with its digest
+    plan.json              all values that determine the frames, with their digest
     layouts/NAME.json      the patterns
     inputs/                height maps and pictures that the plan names
     images/000012.tar      WebDataset: the pictures of shard 12
     tables/000012.parquet  truth, markers, forces and parameters of the same frames, one row a frame
-    shards/000012.json     the record of the shard: the names, sizes and digests of its files. Written last: a shard
+    shards/000012.json     the record of the shard: the names, sizes and digests of its files. The record is written
+    last: a shard
                            with a record is done
     manifest.json          all records
 
-Files are complete under ``unfinished/`` before they are renamed into place. A record whose files are gone or of another
-size does not count, and the shard is made again.
+Files are complete under ``unfinished/`` before they are renamed into place. A record whose files are missing or of
+another size does not count, and the shard is made again.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def number_of_shards(plan: Mapping[str, Any]) -> int:
 
 
 def plan_digest(plan: Mapping[str, Any]) -> str:
-    """SHA-256 (hex) of all in a plan on which frames depend: not of its name, nor of the number of frames."""
+    """SHA-256 (hex) of the values of a plan that determine the frames: without its name and the number of frames."""
     rest = {
         key: _without_locations(value) if key == "sources" else value
         for key, value in plan.items()
@@ -80,10 +81,10 @@ def _without_locations(sources: Iterable[Mapping[str, Any]]) -> list[dict[str, A
 
 
 def open_folder(folder: Path, prepared: Prepared) -> None:
-    """Make the folder with its plan, or find the same plan there.
+    """Make the folder with its plan, or check that the folder has the same plan.
 
     Raises:
-        CmpDesignError: the folder holds another plan, or other things.
+        CmpDesignError: the folder holds another plan, or other files.
         OutputError: a file cannot be written.
     """
     if path_exists(folder / PLAN):
@@ -114,7 +115,7 @@ def read_plan(folder: Path) -> Mapping[str, Any]:
     """The object of plan.json.
 
     Raises:
-        CmpDesignError: there is none, or its digest is not that of its content.
+        CmpDesignError: there is no plan, or its digest is not that of its content.
     """
     path = folder / PLAN
     if not path_exists(path):
@@ -127,9 +128,9 @@ def _parse_plan(text: str, name: str) -> Mapping[str, Any]:
     plan = parse_json(text, name)
     known = isinstance(plan, dict) and plan.get("format") in (FORMAT_FRAMES, FORMAT_EXTRACTION)
     if not known or plan.get("version") != 1:
-        raise InputError(f"{name}: is no plan of this version; expected {FORMAT_FRAMES}, version 1")
+        raise InputError(f"{name} is no plan of this version; expected {FORMAT_FRAMES}, version 1")
     if plan_digest(plan) != plan.get("digest"):
-        raise InputError(f"{name}: was changed, its digest is not that of its content; make a new data set")
+        raise InputError(f"{name} was changed: the digest is not that of the content; make a new data set")
     return dict(plan)
 
 
@@ -162,7 +163,7 @@ def find_record(folder: Path, digest: str, number: int) -> Record | None:
 
 @contextmanager
 def unfinished_shard(folder: Path, number: int) -> Iterator[Stage]:
-    """A place for the files of one shard until they are complete; what a killed worker left there is removed.
+    """A place for the files of one shard until they are complete; files of a killed worker in this place are removed.
 
     Raises:
         OutputError: a file cannot be written; no file of the shard has its name.
@@ -178,7 +179,7 @@ def unfinished_shard(folder: Path, number: int) -> Iterator[Stage]:
         reason = error.strerror or error
         raise OutputError(
             f"{folder}: shard {number} cannot be written ({reason}); finished shards are kept, and the same command "
-            "goes on with the others"
+            "makes the other shards"
         ) from error
     finally:
         with suppress(OSError):
@@ -192,7 +193,7 @@ def commit_shard(folder: Path, stage: Stage, number: int, about: Record) -> Reco
         folder: the data set.
         stage: the place of the files; each has the name of its folder and ending, as in "images.tar".
         number: of the shard.
-        about: more of the record: the plan's digest, and numbers of frames.
+        about: further fields of the record: the plan's digest, and numbers of frames.
 
     Raises:
         OSError: the disk is full, for example.
@@ -225,7 +226,7 @@ def file_digest(path: Path) -> str:
 
 
 def clear_unfinished(folder: Path, numbers: Iterable[int]) -> None:
-    """Remove what killed workers left of some shards; the files of workers that are alive stay."""
+    """Remove files of killed workers for some shards; files of running workers are kept."""
     for number in numbers:
         parent = folder / UNFINISHED / shard_name(number)
         if path_exists(parent):
@@ -238,12 +239,12 @@ def clear_unfinished(folder: Path, numbers: Iterable[int]) -> None:
 
 @dataclass(frozen=True)
 class Progress:
-    """How much of a data set is done.
+    """The finished part of a data set.
 
     Attributes:
-        shards, frames: finished ones.
+        shards, frames: numbers of finished shards and frames.
         of_shards: shards of the plan.
-        redrawn: draws that could not be rendered, and were drawn anew.
+        redrawn: number of draws that could not be rendered and were drawn anew.
         bytes: size of the finished shards' files.
     """
 
@@ -274,7 +275,7 @@ def finished_records(folder: Path) -> list[Record]:
 
 
 def _listed_records(folder: Path, digest: str) -> list[Record]:
-    """The records in the manifest; none where it cannot be read, or is of another plan."""
+    """The records in the manifest; none where the manifest cannot be read or belongs to another plan."""
     try:
         manifest = read_json(folder / MANIFEST)
         if manifest["plan"] != digest:

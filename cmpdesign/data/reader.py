@@ -1,4 +1,4 @@
-"""Data sets read back: as frames one by one, or as Arrow tables of many frames."""
+"""Reading of data sets: frames one by one, or Arrow tables of many frames."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class Frame:
     """A frame of a data set: V views of M markers.
 
     Attributes:
-        values: the columns of its row that are no arrays: frame, design, force_n, "scene.optics.blur_px" and so on.
+        values: the columns of the frame's row that are no arrays: frame, design, force_n, "scene.optics.blur_px" and so
+            on.
         arrays: name -> values: rest_xy_px, true_xy_px and xy_px (V, M, 2) px, cov_px2 (V, M, 3) as xx, xy, yy,
             status and visible (V, M), true_xyz_mm (M, 3); NaN where a marker is lost.
         image_bytes: the encoded picture; b"" of markers that were extracted from a source.
@@ -49,13 +50,13 @@ class Frame:
             ImageFileError: the frame has no picture.
         """
         if not self.image_bytes:
-            raise ImageFileError("the frame has no picture; those of an extraction are in their sources")
+            raise ImageFileError("the frame has no picture; the pictures of an extraction are in its sources")
         pixels: Image = np.ascontiguousarray(decode_bytes(self.image_bytes, "frame")[:, :, :3])
         return pixels
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """The drawn scene, as a scene file has it; empty of an extraction."""
+        """The drawn scene, as in a scene file; empty for an extraction."""
         document: Mapping[str, Any] = json_object(self.values.get("parameters"))
         return document
 
@@ -63,7 +64,7 @@ class Frame:
 class DataSet:
     """The finished shards of a data set; ``load`` makes it.
 
-    A number in brackets gives a frame; iteration gives all, shard by shard. It can be pickled.
+    A number in brackets gives a frame; iteration gives all frames, shard by shard. A ``DataSet`` can be pickled.
 
     Attributes:
         folder: the data set.
@@ -85,23 +86,23 @@ class DataSet:
 
     @property
     def complete(self) -> bool:
-        """Whether all shards of the plan are there."""
+        """Whether all shards of the plan are finished."""
         return len(self._records) == number_of_shards(self.plan)
 
     @property
     def shards(self) -> tuple[int, ...]:
-        """The numbers of the shards that are there."""
+        """The numbers of the finished shards."""
         return tuple(record["shard"] for record in self._records)
 
     @cached_property
     def layouts(self) -> Mapping[str, Reference]:
-        """The layouts by the designs' names; of an extraction one with the name ""."""
+        """The layouts by the designs' names; of an extraction one layout with the name ""."""
         if "designs" not in self.plan:
             return {"": load_layout(self.folder / self.plan["layout"]["file"])}
         return {each["name"]: load_layout(self.folder / each["layout"]) for each in self.plan["designs"]}
 
     def table(self, columns: Sequence[str] | None = None, shards: Iterable[int] | None = None) -> Any:
-        """An Arrow table of all frames, or of those of some shards.
+        """An Arrow table of all frames, or of the frames of some shards.
 
         Args:
             columns: names of columns; None: all.
@@ -156,13 +157,13 @@ class DataSet:
         return Frame(values, arrays, image)
 
     def _members(self, shard: int) -> Mapping[str, Member]:
-        """Where the pictures of a shard stand, by the frames' keys; empty of an extraction."""
+        """The places of the pictures of a shard, by the frames' keys; empty for an extraction."""
         has_images = "image" in self.plan
         return _kept_members(self._path(shard, "images")) if has_images else {}
 
     def _path(self, shard: int, kind: str) -> Path:
         if shard not in self._numbers:
-            raise InputError(f"{self.folder}: shard {shard} is not there; make it first")
+            raise InputError(f"{self.folder}: shard {shard} is missing; make the shard first")
         return self.folder / kind / f"{shard_name(shard)}{_ENDINGS[kind]}"
 
     def _read_table(self, shard: int, columns: Sequence[str] | None) -> Any:
@@ -190,7 +191,7 @@ def load(folder: str | Path) -> DataSet:
 
 
 def json_object(text: str | None) -> Any:
-    """The object of a JSON text; an empty one of None."""
+    """The object of a JSON text; an empty object for None."""
     return {} if text is None else parse_json(text, "parameters")
 
 
@@ -203,7 +204,7 @@ def _shaped(name: str, flat: NDArray[Any], views: int) -> NDArray[Any]:
 
 @contextmanager
 def _damage_told(path: Path) -> Iterator[None]:
-    """Tell of a table that is gone or damaged what helps."""
+    """Within this context, an error of a missing or damaged table has a remedy."""
     with extra("data"):
         import pyarrow
 

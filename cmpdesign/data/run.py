@@ -1,4 +1,4 @@
-"""Data sets made from end to end: prepared, worked on shard by shard, sealed with a manifest."""
+"""Making of data sets: preparation, work shard by shard, and the manifest."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ def make_dataset(plan: str | Path, folder: str | Path, shards: ShardRange, sched
 
     Args:
         plan: the TOML file.
-        folder: the data set: a new folder, or that of an interrupted run of the same plan.
-        shards: which shards.
-        scheduler: where they are made.
+        folder: the data set: a new folder, or the folder of an interrupted run of the same plan.
+        shards: the range of shards.
+        scheduler: the workers.
 
     Raises:
-        CmpDesignError: the plan cannot be carried out, or the folder holds something else; workers were lost.
-        OutputError: a file cannot be written. Finished shards are kept, and in no case is a shard half-written.
+        CmpDesignError: the plan cannot be carried out, or the folder holds other files; workers were lost.
+        OutputError: a file cannot be written. Finished shards are kept, and no shard is half-written.
     """
     return _carry_out(prepare_plan(plan), Path(folder).resolve(), shards, scheduler)
 
@@ -85,9 +85,9 @@ def extract_markers(
         layout: the pattern.
         sources: see ``name_tasks``.
         folder: see ``make_dataset``.
-        reading: how frames are read.
-        scheduler: where parts are read.
-        frames_a_shard: smallest number of frames of a part, but for the last of a source.
+        reading: options of the reader.
+        scheduler: the workers.
+        frames_a_shard: smallest number of frames of a part, except for the last part of a source.
 
     Raises:
         CmpDesignError, OutputError: see ``make_dataset``; or a source cannot be read.
@@ -101,11 +101,11 @@ def extract_markers(
 
 
 def _index(tasks: Sequence[SourceTask], scheduler: Scheduler) -> list[dict[str, Any]]:
-    """The sources, cut; here by threads, because files are mostly waited for."""
+    """The sources, cut into parts; by threads, because most of the time is waiting for files."""
     names = [task.name for task in tasks]
     for name in names:
         if names.count(name) > 1:
-            raise CmpDesignError(f"{name}: is given twice; give each source once")
+            raise CmpDesignError(f"{name} is given twice; give each source once")
     if scheduler.address:
         return list(results(index_source, tasks, scheduler))
     with ThreadPoolExecutor(scheduler.workers) as pool:

@@ -25,7 +25,7 @@ IMAGES, TABLES = "images.tar", "tables.parquet"
 
 
 def make_shard(folder: str, number: int) -> Record:
-    """Make one shard of the data set in a folder, unless it is done.
+    """Make one shard of the data set in a folder, unless the shard is finished.
 
     Args:
         folder: the data set; it holds its plan.
@@ -67,12 +67,12 @@ def _write_frames(folder: Path, plan: Mapping[str, Any], number: int, staged: Pa
 
 @lru_cache(maxsize=2)
 def _frame_maker(folder: Path, digest: str) -> FrameMaker:
-    """The maker of a plan's frames, kept from shard to shard; the digest tells plans in one folder apart."""
+    """The maker of a plan's frames, kept from shard to shard; the digest distinguishes plans in one folder."""
     return FrameMaker(folder, read_plan(folder))
 
 
 def _label(row: Row) -> bytes:
-    """What belongs to a picture in the tar file itself: its number, design, forces and drawn values."""
+    """The values beside a picture in the tar file: number, design, forces and drawn values."""
     names = [name for name in row if name in ("frame", "design", "force_n", "moment_nmm")]
     label = {name: row[name] for name in [*names, *(name for name in row if name.startswith(PREFIX))]}
     return json.dumps(label, ensure_ascii=False, allow_nan=False).encode()

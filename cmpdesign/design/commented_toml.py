@@ -16,17 +16,17 @@ from cmpdesign.design.design import Design
 from cmpdesign.design.extends import FIELD as EXTENDS
 from cmpdesign.patterns import registered_patterns
 
-# What a new design begins with: fields without a default that fix a pattern and its size.
+# The fields of a new design: fields without a default that fix a pattern and its size.
 STARTING_VALUES: Mapping[str, Any] = {"pattern": "honeycomb", "layers": 10, "pitch_mm": 1.5}
 _UNITS = {"_mm_s": "mm/s", "_mm": "mm", "_deg": "degrees", "_percent": "percent", "_px": "px"}
 _WIDTH = 100
 
 
 def commented_toml(extends: str | None = None) -> str:
-    """The text of a new design file. Every field stands in it, as a comment unless it has to be given.
+    """The text of a new design file. The text has every field; fields that need no value are comments.
 
     Args:
-        extends: the design that the file goes on from, a template's name or a path; None: a design of its own with
+        extends: the design that the file extends, a template's name or a path; None: an independent design with
             ``STARTING_VALUES``.
     """
     lines = [
@@ -37,7 +37,7 @@ def commented_toml(extends: str | None = None) -> str:
     given: Mapping[str, Any] = STARTING_VALUES
     if extends is not None:
         lines += [
-            "# The design whose fields hold where none stand here.",
+            "# The design that gives all fields which this file does not set.",
             f"{EXTENDS} = {_toml(extends)}",
             "",
         ]
@@ -56,7 +56,7 @@ def commented_toml(extends: str | None = None) -> str:
 
 
 def _field_lines(name: str, info: FieldInfo, given: Mapping[str, Any]) -> list[str]:
-    """The comment of a field, its line, and a blank line."""
+    """The comment of a field, the line of the field, and a blank line."""
     facts = [fact for fact in (_unit_text(name), _values_text(name, info), _default_text(info)) if fact]
     comment = " ".join([info.description or "", f"[{'; '.join(facts)}]" if facts else ""]).strip()
     start, value = ("", given[name]) if name in given else ("# ", _shown_value(name, info))
@@ -100,7 +100,7 @@ def _default_of(info: FieldInfo) -> Any:
 
 
 def _shown_value(name: str, info: FieldInfo) -> Any:
-    """What a commented line shows: the default, or else a value that the field takes."""
+    """The value in a commented line: the default, or else a value that the field takes."""
     default = _default_of(info)
     if default is not None and default is not PydanticUndefined:
         return default
@@ -114,7 +114,7 @@ def _shown_value(name: str, info: FieldInfo) -> Any:
 
 
 def _parts(annotation: Any) -> list[Any]:
-    """The types of a union, without None and without what is annotated to them."""
+    """The types of a union, without None and without annotations."""
     if get_origin(annotation) in (Union, UnionType):
         return [part for each in get_args(annotation) for part in _parts(each)]
     if get_origin(annotation) is Annotated:
@@ -123,7 +123,7 @@ def _parts(annotation: Any) -> list[Any]:
 
 
 def _metadata(info: FieldInfo) -> Iterator[Any]:
-    """The limits of a field: its own, and those in its type."""
+    """The limits of a field: the field's own limits, and the limits in its type."""
     yield from info.metadata
     yield from _annotated(info.annotation)
 
@@ -139,7 +139,7 @@ def _annotated(annotation: Any) -> Iterator[Any]:
 
 
 def _limits(item: Any) -> Iterator[tuple[str, float]]:
-    """The limits in one piece of metadata: a limit itself, or a ``Field`` that holds some."""
+    """The limits in one piece of metadata: a limit itself, or a ``Field`` with limits."""
     for inner in (item, *getattr(item, "metadata", ())):
         for kind in ("gt", "ge", "lt", "le"):
             value = getattr(inner, kind, None)

@@ -52,12 +52,12 @@ class Palette(BaseModel):
 class Design(_StrictModel):
     """Validated parameters of a pattern. Lengths in mm; texts such as "60mil" are converted.
 
-    A size is given in one of these ways; every other combination is refused with the way to mend it:
+    A size is given in one of these ways; every other combination is refused with a remedy:
 
     * ``pitch_mm`` and ``layers``;
     * ``width_mm`` and/or ``height_mm`` (overall) and ``layers``: the largest pitch that fits;
     * ``width_mm`` and/or ``height_mm`` and ``pitch_mm``: as many layers as fit;
-    * ``pitch_mm`` and a clip outline: as many layers as cover it.
+    * ``pitch_mm`` and a clip outline: as many layers as cover the outline.
 
     Raises:
         DesignError: an unknown, missing, impossible or contradictory parameter.
@@ -66,12 +66,12 @@ class Design(_StrictModel):
     name: Name = Field("", description="The design's name, for captions and reports.")
     description: Line = Field("", description="One sentence about the design.")
     source: Line = Field(
-        "", description='Where the dimensions come from; "assumed" where nobody published them.'
+        "", description='Source of the dimensions; "assumed" for dimensions that are not published.'
     )
 
-    pattern: str = Field(description="The registered pattern to draw.")
+    pattern: str = Field(description="Name of the registered pattern.")
     layers: int | None = Field(
-        None, ge=1, le=MAX_LAYERS, strict=True, description="Layers around the centre."
+        None, ge=1, le=MAX_LAYERS, strict=True, description="Number of layers around the centre."
     )
     pitch_mm: Length | None = Field(None, description="Distance between neighbouring markers (layers).")
     width_mm: Length | None = Field(
@@ -90,14 +90,14 @@ class Design(_StrictModel):
     rotation_deg: Angle = Field(
         0.0, description="Counter-clockwise turn of the pattern, seen from the front."
     )
-    mirrored: bool = Field(False, strict=True, description="The camera looks at the pattern's back.")
+    mirrored: bool = Field(False, strict=True, description="True if the camera sees the pattern's back.")
     virtual_per_edge: int = Field(
-        5, ge=0, le=MAX_VIRTUAL_PER_EDGE, strict=True, description="Virtual markers on every edge."
+        5, ge=0, le=MAX_VIRTUAL_PER_EDGE, strict=True, description="Number of virtual markers on every edge."
     )
 
     clip: Literal["none", "rectangle", "circle"] = Field(
         "none",
-        description="Outline around the centre; only cells wholly inside it (less the border) stay.",
+        description="Outline around the centre; cells that are not inside the outline (less the border) are removed.",
     )
     clip_width_mm: Length | None = Field(None, description="Width of a rectangular clip outline.")
     clip_height_mm: Length | None = Field(None, description="Height of a rectangular clip outline.")
@@ -106,22 +106,22 @@ class Design(_StrictModel):
     palette: Palette = Field(default_factory=Palette, description="The inks.")
     fiducials: Fiducials = Field(
         default_factory=lambda: Fiducials.model_validate({}),
-        description="Marks around the pattern by which jobs, prints and molds agree.",
+        description="Marks around the pattern that align jobs, prints and molds.",
     )
     laser: LaserOptions = Field(
         default_factory=lambda: LaserOptions.model_validate({}),
-        description="How a laser carves the cells; for --only laser.",
+        description="Parameters of the laser job; for --only laser.",
     )
     mold: MoldOptions = Field(
         default_factory=lambda: MoldOptions.model_validate({}),
-        description="How the elastomer is cast in layers; for --only mold,mesh.",
+        description="Parameters of the molds; for --only mold,mesh.",
     )
     sheet: SheetOptions = Field(
         default_factory=lambda: SheetOptions.model_validate({}),
-        description="The page that pads are printed on; for --only print.",
+        description="Parameters of the print sheet; for --only print.",
     )
 
-    print_ids: bool = Field(False, strict=True, description="SVG: write every marker's id beside it.")
+    print_ids: bool = Field(False, strict=True, description="SVG: write the id beside every marker.")
     print_scale: bool = Field(
         False, strict=True, description="SVG: a scale bar and a caption below the pattern."
     )
@@ -152,7 +152,7 @@ class Design(_StrictModel):
         if all(given):
             return (
                 "pitch_mm, layers and an overall size (width_mm, height_mm) fix the size twice; "
-                "leave one of the three out (a template's by --set layers=none)"
+                "leave one of the three out (a value of a template by --set layers=none)"
             )
         if sum(given) == 2 or (self.pitch_mm is not None and self.clip != "none"):
             return ""
@@ -177,7 +177,7 @@ class Design(_StrictModel):
                 return f'{field} needs clip = "{owner}", but clip is "{self.clip}"'
             if value is not None and value <= 2 * self.border_mm:
                 return (
-                    f"{field} = {value:g} mm leaves nothing inside a border of {self.border_mm:g} mm "
+                    f"{field} = {value:g} mm leaves no area inside a border of {self.border_mm:g} mm "
                     f"on both sides; make it larger than {2 * self.border_mm:g} mm or the border smaller"
                 )
         return ""
@@ -223,7 +223,7 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None
 
 
 def design_schema() -> dict[str, Any]:
-    """The JSON Schema of a design's TOML, for editors; it is stored in ``cmpdesign/design.schema.json``."""
+    """The JSON Schema of a design's TOML, for editors; stored in ``templates/design.schema.json``."""
     schema = Design.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "cmpdesign design"
@@ -231,7 +231,8 @@ def design_schema() -> dict[str, Any]:
     extends = {
         "type": "string",
         "minLength": 1,
-        "description": "A template, or a file's path from this file's folder: its fields hold where none stand here.",
+        "description": "A template, or a file's path relative to this file's folder: the design that gives all fields "
+        "which this file does not set.",
     }
     schema["properties"] = {"extends": extends, **schema["properties"]}
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["extends"]}]
@@ -263,7 +264,7 @@ def _update_overrides(data: dict[str, Any], overrides: Mapping[str, object]) -> 
 
 
 def _parse_toml_value(text: str) -> object:
-    """The TOML value of a text, or the text itself: "3" becomes a number, "60mil" stays a text."""
+    """The TOML value of a text, or the text itself: "3" is a number, "60mil" a text."""
     try:
         document = parse_toml(f"value = {text}", "")
     except InputError:

@@ -1,7 +1,7 @@
-"""Design files that go on from another design: ``extends = "tac3d"``, or the path of a file.
+"""Design files that extend another design: ``extends = "tac3d"``, or the path of a file.
 
-The fields of the file stand over those of the design that it extends, table by table. The text "none" takes a field
-away that the other design gives, as after ``--set``. ``name``, ``description`` and ``source`` tell of one file and are
+The fields of the file replace the fields of the extended design, table by table. The text "none" removes a field
+of the extended design, as after ``--set``. ``name``, ``description`` and ``source`` describe one file and are
 not passed on.
 """
 
@@ -17,12 +17,12 @@ from cmpdesign.inputs.documents import read_toml
 
 FIELD = "extends"
 OWN_FIELDS = ("name", "description", "source")
-MOST_FILES = 20  # of a chain; the longest of use has three or four
+MOST_FILES = 20  # of a chain; the longest useful chain has three or four
 REMOVED = "none"
 
 
 def read_design_file(path: Path) -> dict[str, Any]:
-    """The document of a design file with all that it extends.
+    """The document of a design file, with the fields of all designs that the file extends.
 
     Args:
         path: the TOML file. A path after ``extends`` is relative to the folder of its file.
@@ -37,7 +37,7 @@ def read_design_file(path: Path) -> dict[str, Any]:
     while following is not None:
         if any(_is_same(following, earlier) for earlier in chain):
             loop = " -> ".join(map(str, (*chain, following)))
-            raise DesignError(f"{path}: extends leads in a circle: {loop}; take one of the lines away")
+            raise DesignError(f"{path}: extends leads in a circle: {loop}; remove one of the lines")
         if len(chain) == MOST_FILES:
             raise DesignError(
                 f"{path}: extends leads through more than {MOST_FILES} files; shorten the chain"
@@ -96,7 +96,7 @@ def _is_same(one: Path, other: Path) -> bool:
 
 
 def _merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of both, those of ``above`` first, in tables of both likewise."""
+    """The fields of both documents; fields of ``above`` have priority, also within tables."""
     merged = dict(below)
     for name, value in above.items():
         if value == REMOVED:

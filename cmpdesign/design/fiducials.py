@@ -25,9 +25,13 @@ class Fiducials(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    count: Literal[0, 3, 4] = Field(3, description="How many: 0, 3 or 4.")
-    diameter_mm: Length = Field(2.0, description="Diameter of a mark; a hole of it takes a pin.")
-    gap_mm: LengthOrZero = Field(2.0, description="Between the pattern's bounding box and a mark's rim.")
+    count: Literal[0, 3, 4] = Field(3, description="Number of marks: 0, 3 or 4.")
+    diameter_mm: Length = Field(
+        2.0, description="Diameter of a mark; a pin of this diameter fits into the hole."
+    )
+    gap_mm: LengthOrZero = Field(
+        2.0, description="Distance between the pattern's bounding box and a mark's rim."
+    )
 
 
 def fiducial_positions(fiducials: Fiducials, outline_mm: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ Passes = Annotated[int, Field(ge=1, le=200, strict=True)]
 
 
 class LaserOptions(BaseModel):
-    """How a laser carves the cells. Lengths in mm, angles in degrees, speeds in mm/s, power in percent."""
+    """Parameters of the laser job. Lengths in mm, angles in degrees, speeds in mm/s, power in percent."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -27,14 +27,16 @@ class LaserOptions(BaseModel):
     )
     corner: Literal["plain", "overcut"] = Field(
         "overcut",
-        description="What becomes of corners: rounded, or a short spur to each that balances the lost area.",
+        description="Corners: rounded, or with a short spur that balances the lost area.",
     )
     order: Literal["travel", "heat", "given"] = Field(
-        "travel", description="Short ways, neighbours far apart in time, or as in the layout."
+        "travel",
+        description="Order of the cells: short travel, long times between neighbours, or as in the layout.",
     )
     face: Literal["front", "middle", "back"] | None = Field(
         None,
-        description="Where a cell has its nominal size when the beam tapers; else at the side that the camera sees.",
+        description="Face at which a cell has its nominal size when the beam tapers; else the side that the camera "
+        "sees.",
     )
     fill: Literal["hatch", "offset"] = Field("hatch", description="Pocket: parallel lines or rings.")
     hatch_mm: Length | None = Field(None, description="Pocket: pitch of lines or rings, else half the kerf.")
@@ -43,15 +45,18 @@ class LaserOptions(BaseModel):
     depth_mm: Length | None = Field(None, description="Depth of the cavities; else the material's thickness.")
 
     kerf_mm: LengthOrZero | None = Field(
-        None, description="Kerf at the front, both ways; instead of x and y. 0: paths are not compensated."
+        None,
+        description="Kerf at the front, in both directions; instead of x and y. 0: paths are not compensated.",
     )
     kerf_x_mm: Length | None = Field(None, description="Width of a cut that runs in y, at the front.")
     kerf_y_mm: Length | None = Field(None, description="Width of a cut that runs in x, at the front.")
-    taper_deg: Angle | None = Field(None, description="Lean of each wall; positive narrows towards the back.")
-    power_percent: Share | None = Field(None, description="Power in percent of the machine's.")
+    taper_deg: Angle | None = Field(
+        None, description="Angle of each wall; positive: the cut narrows towards the back."
+    )
+    power_percent: Share | None = Field(None, description="Power in percent of the machine's power.")
     speed_mm_s: Speed | None = Field(None, description="Speed with the beam on.")
-    passes: Passes | None = Field(None, description="How often the beam runs over every path.")
-    minimum_web_mm: LengthOrZero | None = Field(None, description="The narrowest wall that holds.")
+    passes: Passes | None = Field(None, description="Number of times that the beam runs over every path.")
+    minimum_web_mm: LengthOrZero | None = Field(None, description="The narrowest wall that does not break.")
 
     holes: bool = Field(True, strict=True, description="First job: the fiducials as pin holes.")
     outline: bool = Field(False, strict=True, description="Last job: the pad, cut out along its outline.")

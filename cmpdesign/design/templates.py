@@ -59,7 +59,7 @@ def find_template(name: str) -> tuple[str, Path]:
 
 
 class TemplateWords(NamedTuple):
-    """What a template says of itself."""
+    """A template's description and source."""
 
     description: str
     source: str

@@ -8,8 +8,8 @@ from typing import Any
 from cmpdesign.evaluate.runner import RunOptions, Trial
 
 RECOGNITION_RULE = (
-    "A cell is recognised when the n corners that stand out most of its contour are convex, each by at least 1.5 px, "
-    "and its outline fits them; a corner gets the number of the corner at rest in whose direction it lies."
+    "A cell is recognised when the n most prominent corners of its contour are convex, each by at least 1.5 px, "
+    "and the outline fits these corners; a corner gets the number of the corner at rest with the nearest direction."
 )
 CELL_SIDES = (3, 4, 6)
 EDGE_LENGTHS_PX = (20, 50, 100, 400)

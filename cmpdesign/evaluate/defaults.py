@@ -1,4 +1,4 @@
-"""What the experiments take where nothing is given."""
+"""Default values of the experiments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``evaluate designs``: any designs on one sensor, under its set of contacts: error, yield and cost."""
+"""``evaluate designs``: designs compared on one sensor, under its set of contacts: error, yield and cost."""
 
 from __future__ import annotations
 

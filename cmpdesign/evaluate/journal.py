@@ -36,7 +36,7 @@ HASHED_PACKAGES = (
 
 
 def fingerprint(conditions: Mapping[str, Any]) -> str:
-    """SHA-256 (hex) of the conditions of a run, on which all results depend."""
+    """SHA-256 (hex) of the conditions of a run, which determine all results."""
     text = json.dumps(conditions, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
@@ -90,7 +90,7 @@ class Journal:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if path_exists(self.path) and not is_regular_file(self.path):
-                raise OutputError(f"{self.path}: is no regular file; remove it, or give another folder")
+                raise OutputError(f"{self.path} is no regular file; remove it, or give another folder")
             self._file = self.path.open("a", encoding="utf-8", newline="\n")
         except (OSError, ValueError) as error:
             if isinstance(error, OutputError):

@@ -1,6 +1,6 @@
-"""``evaluate reliability``: how often a pattern is read under a ball that presses, then twists or shears (Table I).
+"""``evaluate reliability``: share of successful readings under a ball that presses, then twists or shears (Table I).
 
-Every method reads the same contacts. A reading is judged against the truth of the rendered picture.
+Every method reads the same contacts. A reading is compared with the truth of the rendered picture.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ CONTACT_DISPLACEMENT_SHARE = 0.1
 # A marker is right within this distance of its true position, in edges at rest.
 PLACE_TOLERANCE_EDGES = 0.25
 SUCCESS_CRITERIA = {
-    "strict": "in both views every visible marker of the contact's area has its number and its place, and nowhere does "
-    "a marker have a wrong place",
+    "strict": "in both views every visible marker of the contact's area has its number and its place, and no "
+    "marker has a wrong place",
     "area_95": "the same with 95 % of the visible markers of the contact's area",
-    "no_wrong": "at least half of the visible markers of the contact's area, and nowhere a wrong place",
+    "no_wrong": "at least half of the visible markers of the contact's area, and no wrong place",
 }
 SUCCESS_DEFINITION = (
     f"Successful: {SUCCESS_CRITERIA['strict']}. A place is right within {PLACE_TOLERANCE_EDGES:g} edges "

@@ -1,4 +1,4 @@
-"""Runs trials on several cores and writes each result to the journal. Results do not depend on number and order."""
+"""Trials on several cores, each result written to the journal. Results do not depend on number and order."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class RunOptions:
 Work = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
-# (title, number of trials, number of those in the journal) -> what is called after every trial, with a note.
+# (title, number of trials, number of trials in the journal) -> function that is called after every trial, with a note.
 TrialsBar = Callable[[str, int, int], AbstractContextManager[Callable[[str], None]]]
 
 
@@ -97,7 +97,7 @@ def run_trials(
         trials: the trials.
         journal: the results of earlier runs; new results are added.
         workers: number of processes; 1: this process.
-        title: what is run, for the progress bar.
+        title: title of the progress bar.
         bar: shows the progress of the trials.
 
     Raises:
@@ -128,7 +128,7 @@ def _iterate_results(
         return
     from concurrent.futures import as_completed
 
-    # Left early, trials in work would take up to a minute, and their results are not kept: the pool ends them.
+    # At an early end, the pool ends unfinished trials, which would take up to a minute: their results are not kept.
     with worker_pool(workers) as pool:
         keys = {pool.submit(_run_trial, work, dict(trial.values)): trial.key for trial in trials}
         for done in as_completed(keys):

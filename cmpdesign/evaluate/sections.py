@@ -11,18 +11,18 @@ from cmpdesign.evaluate.report.page import Plot, Section, Table
 
 Document = Mapping[str, Any]
 
-DIFFERENCES_TITLE = "Why our figures differ from the article's"
+DIFFERENCES_TITLE = "Differences from the article's figures, and causes"
 DIFFERENCES = (
     "The article measured two manufactured sensors at ten places; here one sensor is simulated with "
-    "each pattern. The edges are as drawn: no color has run, and squares stick only by the lens' blur.",
+    "each pattern. The edges are as drawn: no color has bled, and squares merge only by the lens' blur.",
     "Geometry of the optics, size of the image, light, friction and thickness of the elastomer are "
-    "assumed: the article states none of them. The elastomer is linear, and loads of this size strain it "
+    "assumed: the article does not state them. The elastomer is linear, and loads of this size strain it "
     "by far more than linear theory predicts well.",
 )
 DIFFERENCES_PRECISION = (
     "The cube's side is ten pitches of the square pattern. Where the cube lies along the square pattern's rows, a "
     "whole row is missed at once. Turned at random, the patterns differ by much less, and virtual markers remove "
-    "most of the rest. The change at the aligned cube is no measure of how finely a pattern resolves an edge.",
+    "most of the rest. The change at the aligned cube is no measure of the resolution of an edge.",
     "Under a shear the bonded layer drags its surroundings along: half of the largest movement in y lies "
     "millimetres outside the cube's face with both patterns. Edge points chosen by their depth lie "
     "under the face again.",
@@ -34,10 +34,10 @@ DIFFERENCES_RESPONSE = (
 DIFFERENCES_RELIABILITY = (
     "The square pattern is read by adaptive threshold, erosion, contours and sub-pixel corners. The "
     "article does not describe the former method in detail; a reader that tries several erosions loses "
-    "less to sticking.",
-    "The multicolor pattern's numbering and its refinement fail apart: where 'multicolor unrefined' "
-    "succeeds and 'multicolor' does not, all markers were found and numbered, and refinement then gave "
-    "some up or moved them to wrong places where the gridlines bend strongly.",
+    "fewer squares that merge.",
+    "The multicolor pattern's numbering and its refinement fail independently: where 'multicolor unrefined' "
+    "succeeds and 'multicolor' does not, all markers were found and numbered, and refinement then lost "
+    "markers or moved them to wrong places where the gridlines bend strongly.",
 )
 
 
@@ -64,7 +64,7 @@ def conditions_section(document: Document) -> Section:
 
 
 def differences_section(own_points: Sequence[str]) -> Section:
-    """The section on differences from the article: an experiment's own points, then the common ones."""
+    """The section on differences from the article: the points of an experiment, then the common points."""
     return Section(DIFFERENCES_TITLE, points=[*own_points, *DIFFERENCES])
 
 
@@ -104,8 +104,9 @@ def reliability_sections(document: Document) -> list[Section]:
             [
                 document["definition"],
                 "A ball of radius 20 mm presses by 2 mm, then turns by 30 degrees clockwise, or shears by 1.5 mm in x "
-                "or y. Place, light, blur, noise and specks are drawn for every trial; all methods see the same ones.",
-                "'Square saddles' is a stronger reader of the square pattern than its users had. 'Multicolor "
+                "or y. Place, light, blur, noise and specks are drawn for every trial; they are the same for all "
+                "methods.",
+                "'Square saddles' is a stronger reader of the square pattern than the article's. 'Multicolor "
                 "unrefined' stops at the means of the triangles' corners, where the article's method stops.",
             ],
             tables=[table],
@@ -169,7 +170,7 @@ def _change_rows(cases: Document) -> list[Sequence[str]]:
 def _edge_section(edges: Document) -> Section:
     rows = _change_rows({MODES[mode]: entry for mode, entry in edges.items()})
     table = Table(
-        "Edge fitting error, mm: by how much the fitted square's side misses 15 mm, mean over the places.",
+        "Edge fitting error, mm: difference of the fitted square's side and 15 mm, mean over the places.",
         ("mode", "square", "multicolor", "change", "the article"),
         rows,
     )
@@ -184,8 +185,9 @@ def _edge_section(edges: Document) -> Section:
         [
             "A cube of 15 mm presses by 1 mm, or presses by 1 mm and shears by 1 mm in y, at ten places 4 mm apart. "
             "Markers that move by more than half of the largest displacement (in z, or along the shear) are its edge "
-            "points; the square around them, lying as the cube does, has the larger of their width and height. It "
-            "lies along the square pattern's rows, diagonal to them (45 degrees), or turned at random."
+            "points; the square around them, with the cube's direction, has the larger of their width and height. The "
+            "cube "
+            "lies along the square pattern's rows, diagonal to the rows (45 degrees), or turned at random."
         ],
         tables=[table],
         plots=[Plot("Every place's error, and the means.", plots.plot_values(sides, "error, mm"))],
@@ -242,10 +244,11 @@ def _shape_section(document: Document) -> Section:
     return Section(
         "Shapes of five objects",
         [
-            "Each object is pressed by 2 mm. The displacement that the pattern's smooth field gives is compared with "
-            "the true one, every 0.25 mm of the area that has moved by at least a tenth of the largest movement. Where "
-            "a marker has no place, its cells give no surface: an error counts only the area covered. Sigma is the "
-            "error over the reconstruction's stated deviation: 1 is right. At rest nothing is pressed."
+            "Each object is pressed by 2 mm. The displacement by the pattern's smooth field is compared with "
+            "the true displacement, every 0.25 mm of the area that has moved by at least a tenth of the largest "
+            "movement. Where "
+            "a marker has no place, its cells give no surface: an error contains only the area covered. Sigma is the "
+            "error over the reconstruction's stated deviation: 1 is right. At rest no object is pressed."
         ],
         tables=[table],
         plots=[Plot("Error of the reconstructed surface, RMS.", plots.plot_bars(errors, "RMS, µm"))],
@@ -316,8 +319,8 @@ def angle_sections(document: Document) -> list[Section]:
         sections.append(Section(title, tables=[table], plots=[plot]))
     rule = [
         document["rule"],
-        "The formulas are limits of geometry; a cell of few pixels is lost earlier, since its flattened corner no "
-        "longer stands out of its contour.",
+        "The formulas are limits of geometry; a cell of few pixels is lost earlier, because its flattened corner no "
+        "longer is a corner of its contour.",
     ]
     return [Section("Rule", rule), *sections]
 
@@ -365,10 +368,11 @@ def design_sections(document: Document) -> list[Section]:
         Section(
             "Designs",
             [
-                "All designs see the same contacts of the sensor file at the same places in the same light. The "
-                "surface is compared where it moves by a tenth of its largest way or more; an error counts the area "
+                "All designs have the same contacts of the sensor file at the same places in the same light. The "
+                "surface is compared where it moves by a tenth of its largest movement or more; an error contains the "
+                "area "
                 "covered only. "
-                "Pictures in which nothing was read count as 0 % covered and measured, and not in the errors."
+                "Pictures without a reading count as 0 % covered and measured, and not in the errors."
             ],
             tables=[Table("Means over all contacts and places.", headings, rows)],
             plots=[Plot("Error against density.", plots.plot_error_over_density(points))],

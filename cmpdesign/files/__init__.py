@@ -1,4 +1,4 @@
-"""Atomic writing of files, and the formats that several rooms share: images, video, ``layout.json``.
+"""Atomic writing of files, and the formats that several rooms use: images, video, ``layout.json``.
 
 In: bytes, arrays, a ``Layout``. Out: files, and the contents of files.
 """

@@ -15,15 +15,15 @@ from cmpdesign.errors import OutputError
 from cmpdesign.files.locks import Lock, open_for_lock, try_lock
 
 STAGE_PREFIX = ".cmpdesign-"
-# Names that ``tempfile.mkdtemp`` makes of the prefix.
+# Names that ``tempfile.mkdtemp`` makes from the prefix.
 _STAGE_NAME = re.compile(re.escape(STAGE_PREFIX) + "[a-z0-9_]{8}")
 
 
 class Stage:
     """A folder of a random name for files that are not complete; locked while its process lives.
 
-    Stages that killed processes left in the same place are removed first. Nothing in a stage can be a link that
-    somebody else made, because only the own user may write into it.
+    Stages of killed processes in the same place are removed first. No entry of a stage can be a link that
+    another user made, because only this user may write into the stage.
 
     Attributes:
         folder: the folder.
@@ -59,7 +59,7 @@ class Stage:
         sync_folder(path.parent)
 
     def close(self) -> None:
-        """Remove the folder and what is in it."""
+        """Remove the folder and its content."""
         shutil.rmtree(self.folder, ignore_errors=True)
         if self._descriptor is not None:
             os.close(self._descriptor)
@@ -73,7 +73,7 @@ class Stage:
 
 
 def remove_abandoned_stages(parent: Path) -> None:
-    """Remove the stages of killed processes from a folder: those of the own user that no process has locked."""
+    """Remove the stages of killed processes from a folder: stages of this user that no process has locked."""
     for path in _stages_in(parent):
         descriptor = open_for_lock(path)
         if descriptor is None:
@@ -86,7 +86,7 @@ def remove_abandoned_stages(parent: Path) -> None:
 
 
 def _is_own(descriptor: int) -> bool:
-    """True if an open file or folder belongs to the user; on Windows, which does not say so, always."""
+    """True if an open file or folder belongs to the user; always true on Windows, which does not state the owner."""
     return sys.platform == "win32" or os.fstat(descriptor).st_uid == os.geteuid()
 
 
@@ -106,7 +106,7 @@ def _stages_in(parent: Path) -> list[Path]:
 def staged_file(path: str | Path) -> Iterator[Path]:
     """Yield the path of a file to write; after the block, the file is flushed to disk and renamed to ``path``.
 
-    An error within the block leaves what is at ``path`` unchanged, and no other file.
+    An error within the block leaves the file at ``path`` unchanged, and no other file.
 
     Raises:
         OSError: the file cannot be written.
@@ -169,7 +169,7 @@ def sync_file(path: Path) -> None:
     """Flush a file, or all files of a folder, to disk, so that a full disk is an error before a rename.
 
     Raises:
-        OSError: not all of it is on disk.
+        OSError: not all data is on disk.
     """
     if path.is_dir():
         for inner in path.iterdir():
@@ -181,7 +181,7 @@ def sync_file(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Flush the names in a folder to disk, where the system can: a rename then survives a loss of power."""
+    """Flush the names in a folder to disk, where the system can: a rename is then kept after a loss of power."""
     with suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY)
         try:

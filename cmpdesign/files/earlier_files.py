@@ -1,8 +1,9 @@
 """Removal of files that an earlier build wrote and this build does not make.
 
-The output folder and each product's folder hold a list of the written files with digests. Only files on a list with an
-unchanged digest are removed, so files of the user and changed files stay. A list also names the pattern of its files:
-where a build makes another pattern, all files of the earlier one go, because files of two patterns do not fit together.
+The output folder and each product's folder have a list of the written files with digests. Only files on a list with an
+unchanged digest are removed, so files of the user and changed files are kept. A list also names the pattern of its
+files: where a build makes another pattern, all files of the earlier pattern are removed, because files of two patterns
+    do not fit together.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def find_stale_files(
 ) -> list[Path]:
     """Find unchanged files on earlier lists that this build does not make.
 
-    In a product's folder that this build writes these are all such files; elsewhere those of another pattern.
+    In the folder of a product that this build writes, all such files; in other folders, files of another pattern.
 
     Args:
         output: the output folder, before the files of this build are written.
@@ -108,7 +109,7 @@ def remove_files(paths: Iterable[Path]) -> list[Path]:
     """Remove files, and folders that become empty; the removed files."""
     removed = []
     for path in paths:
-        # A file that cannot be removed stays without harm.
+        # A file that cannot be removed does no harm.
         with suppress(OSError):
             path.unlink()
             removed.append(path)
@@ -118,7 +119,7 @@ def remove_files(paths: Iterable[Path]) -> list[Path]:
 
 
 def _read_file_list(path: Path) -> _FileList:
-    """An earlier list; an empty one without a valid list."""
+    """An earlier list; an empty list if there is no valid list."""
     try:
         document = read_json(path)
         if (document["format"], document["version"]) != ("cmp-files", 1):

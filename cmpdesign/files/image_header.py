@@ -35,9 +35,9 @@ _ODD = (
 
 
 def open_header(data: bytes) -> ImageFile | None:
-    """Open an image without decoding its pixels; None if it is no PNG, JPEG, TIFF, BMP, WebP, PGM or PPM.
+    """Open an image without decoding its pixels; None if the file is no PNG, JPEG, TIFF, BMP, WebP, PGM or PPM.
 
-    ``PIL.Image.open`` warns of and refuses large images; here the caller sets the limit.
+    ``PIL.Image.open`` warns of large images and refuses very large images; here the caller sets the limit.
     """
     from importlib import import_module
 

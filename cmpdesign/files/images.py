@@ -49,7 +49,7 @@ def read_image(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool =
 
 
 def is_image_file(path: str | Path) -> bool:
-    """True if a file begins as an image does that ``read_image`` knows; False also for what cannot be read."""
+    """True if a file begins like an image that ``read_image`` knows; False also for a file that cannot be read."""
     try:
         with open_file(path) as file:
             return size_in_header(file.read(_HEADER_BYTES)) is not None
@@ -79,7 +79,7 @@ def decode_bytes(data: bytes, path: str | Path, most_pixels: int = MOST_PIXELS) 
     import cv2
 
     if not data:
-        raise ImageFileError(f"{path}: is empty; expected an image")
+        raise ImageFileError(f"{path} is empty; expected an image")
     size = size_in_header(data)
     if size is None:
         raise ImageFileError(f"{path}: {_NO_IMAGE}")
@@ -115,7 +115,7 @@ def _to_bgr(pixels: NDArray[Any], path: Path, gray: bool) -> Image:
     if channels == 1 and gray:
         return np.ascontiguousarray(np.repeat(pixels.reshape(height, width, 1), 3, axis=2))
     if channels < 3:
-        raise ImageFileError(f"{path}: is a grayscale image; a multicolor pattern needs color (3 channels)")
+        raise ImageFileError(f"{path} is a grayscale image; a multicolor pattern needs color (3 channels)")
     return np.ascontiguousarray(pixels[:, :, :3])
 
 

@@ -70,7 +70,7 @@ def layout_document(layout: Layout) -> dict[str, Any]:
 
 
 def pattern_digest(layout: Layout) -> str:
-    """SHA-256 (hex) of all that the layout file says of the pattern, the program's version left out."""
+    """SHA-256 (hex) of the content of the layout file without the program's version."""
     lines = layout_to_json(layout).splitlines()
     return hashlib.sha256(
         "\n".join(line for line in lines if '"generator": ' not in line).encode()
@@ -92,7 +92,7 @@ def _as_made_object(as_made: AsMade) -> dict[str, Any]:
 
 
 def _without_repeats(points: list[list[float]]) -> list[list[float]]:
-    """The points without those at the end that repeat the last one."""
+    """The points without the repetitions of the last point."""
     count = len(points)
     while count > 3 and points[count - 1] == points[count - 2]:
         count -= 1

@@ -16,7 +16,7 @@ class Lock(Enum):
     UNSUPPORTED = "unsupported"  # by the system or the file system
 
 
-# Windows locks bytes, and nobody else can read a locked byte: this one lies behind the end of any file that is locked.
+# Windows locks bytes, and no other process can read a locked byte: this byte lies behind the end of every locked file.
 _LOCKED_BYTE = 2**31 - 2
 
 
@@ -55,7 +55,9 @@ else:
 
 
 def open_for_lock(path: Path) -> int | None:
-    """A descriptor of a file or folder for ``try_lock``, not through a link; None where the system gives none."""
+    """A descriptor of a file or folder for ``try_lock``, not through a link; None where the system gives no
+    descriptor.
+    """
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
         return os.open(path, flags)

@@ -21,11 +21,11 @@ _DAMAGE = (
 
 
 class NpzError(CmpDesignError, ValueError):
-    """A file that is no .npz, or whose checksums are wrong; the message says why, without the name."""
+    """A file that is no .npz, or whose checksums are wrong; the message states the cause, without the name."""
 
 
 def read_npz(path: str | Path, *names: str, most_bytes: int | None = None) -> dict[str, NDArray[Any]]:
-    """Read the named arrays of a file, or all.
+    """Read the named arrays of a file, or all arrays.
 
     Args:
         path: the file.

@@ -12,9 +12,9 @@ from cmpdesign.inputs.documents import read_json
 
 
 def find_other_designs(output: Path, folders: Iterable[str], digest: str, pattern: str) -> list[Path]:
-    """Find what belongs to another layout than the one with this digest.
+    """Find the files that belong to another layout than the layout with this digest.
 
-    Looked at are ``layout.json``, ``as-made/*.json`` and the lists of files in the products' folders.
+    The function reads ``layout.json``, ``as-made/*.json`` and the lists of files in the products' folders.
 
     Args:
         output: the output folder, after the files of a build are written.

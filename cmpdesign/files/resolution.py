@@ -33,9 +33,9 @@ def resolution_dpi(path: str | Path) -> tuple[float, float] | str:
     except (InputError, OSError, ValueError, SyntaxError, TypeError, ArithmeticError):
         return "the file's resolution cannot be read"
     if any(tag in exif for tag in _EXPOSURE):
-        return "a photo's resolution tag says nothing of the sheet"
+        return "the resolution tag of a photo is not the resolution of the sheet"
     if not stated:
         return "the file states no resolution"
     if not (x >= LEAST_DPI and y >= LEAST_DPI):
-        return f"the file states {x:.3g} dpi, which programs write that know no resolution"
+        return f"the file states {x:.3g} dpi, the default of programs that know no resolution"
     return x, y

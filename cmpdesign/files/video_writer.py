@@ -78,7 +78,7 @@ class VideoWriter:
             self.discard()
         raise OutputError(
             f"{self._path}: {frames} of {self._frames} frames could be written; is the disk full? "
-            f"They are kept in {kept}"
+            f"the written frames are kept in {kept}"
         )
 
     def discard(self) -> None:

@@ -34,7 +34,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{name}: is no valid TOML: {error}") from None
+        raise InputError(f"{name} is no valid TOML: {error}") from None
     except RecursionError:
         raise InputError(f"{name}: is nested more than {MOST_LEVELS} levels deep") from None
     except ValueError:  # the interpreter's limit on the digits of an integer
@@ -63,7 +63,7 @@ def parse_json(text: str, name: str) -> Any:
     try:
         value = json.loads(text, object_pairs_hook=_refuse_repeated)
     except json.JSONDecodeError as error:
-        raise InputError(f"{name}: is no JSON: {error}") from None
+        raise InputError(f"{name} is no JSON: {error}") from None
     except RecursionError:
         raise InputError(f"{name}: is nested more than {MOST_LEVELS} levels deep") from None
     except _RepeatedName as error:

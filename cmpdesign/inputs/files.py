@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 from cmpdesign.errors import InputError
 
-MOST_TEXT_BYTES = 1 << 24  # 16 MiB: of a document; the largest that a command writes has some 3 MiB
+MOST_TEXT_BYTES = 1 << 24  # 16 MiB: of a document; the largest document that a command writes has some 3 MiB
 MOST_PIXELS = 250_000_000  # of an image; A4 at 1200 dpi has 139 million
 MOST_DATA_BYTES = 1 << 31  # 2 GiB: of an image or an array
 _KINDS = {
@@ -22,7 +22,7 @@ _KINDS = {
 
 
 def open_file(path: str | Path) -> BinaryIO:
-    """Open a regular file for reading, in parts and at any place. A pipe is not waited for.
+    """Open a regular file for reading, in parts and at any place. The function does not wait for a pipe.
 
     Raises:
         InputError: the file cannot be opened, or is no regular file.
@@ -44,7 +44,7 @@ def open_file(path: str | Path) -> BinaryIO:
 
 
 def read_file(path: str | Path, most_bytes: int = MOST_DATA_BYTES) -> bytes:
-    """Read a regular file. A pipe is not waited for.
+    """Read a regular file. The function does not wait for a pipe.
 
     Args:
         path: the file.
@@ -55,7 +55,7 @@ def read_file(path: str | Path, most_bytes: int = MOST_DATA_BYTES) -> bytes:
     """
     with open_file(path) as file:
         try:
-            # As many bytes as are asked for are allocated.
+            # ``read`` allocates the requested number of bytes.
             data = file.read(min(os.fstat(file.fileno()).st_size, most_bytes) + 1)
         except OSError as error:
             raise _unreadable(path, error) from None
@@ -104,7 +104,7 @@ def is_folder(path: str | Path) -> bool:
 
 
 def path_exists(path: str | Path) -> bool:
-    """True if something is there; False also for paths that no file can have."""
+    """True if a file or folder exists; False also for paths that no file can have."""
     try:
         Path(path).stat()
     except (OSError, ValueError):
@@ -118,7 +118,7 @@ def _unreadable(path: str | Path, error: OSError | ValueError) -> InputError:
 
 
 def _too_large(path: str | Path, most_bytes: int) -> InputError:
-    return InputError(f"{path}: is larger than {_size_text(most_bytes)}, the limit for such a file")
+    return InputError(f"{path} is larger than {_size_text(most_bytes)}, the limit for this kind of file")
 
 
 def _size_text(count: int) -> str:

@@ -14,7 +14,7 @@ _MOST_COMPARED = 60  # letters of an unknown name that are compared with the kno
 
 
 def nearest_name(word: object, known: Iterable[str]) -> str:
-    """The part of a message that names the nearest known name; empty if none is near.
+    """The part of a message that states the nearest known name; empty if no known name is near.
 
     >>> nearest_name("honeycom", ["round", "honeycomb"])
     ' (did you mean honeycomb?)'
@@ -36,7 +36,8 @@ def one_printable_line(value: str) -> str:
     return value
 
 
-# A name of a design, a machine, a material, a product: it reaches XML, job sheets, file names and the terminal.
+# A name of a design, a machine, a material, a product: names are written to XML, job sheets, file names and the
+# terminal.
 Name = Annotated[str, Field(max_length=MOST_NAME_LETTERS), AfterValidator(one_printable_line)]
 # A sentence: a source, a description, a remedy.
 Line = Annotated[str, Field(max_length=MOST_LINE_LETTERS), AfterValidator(one_printable_line)]

@@ -1,4 +1,4 @@
-"""What a text names that images come from: pictures, folders, patterns of names, videos, cameras, streams.
+"""Sources of images by their texts: pictures, folders, patterns of names, videos, cameras, streams.
 
 ``verify``, ``track``, ``reconstruct`` and ``calibrate`` take the same texts.
 """
@@ -20,11 +20,11 @@ _ADDRESS = re.compile(r"(rtsp|rtsps|rtmp|http|https|udp|tcp)://", re.IGNORECASE)
 
 
 class SourceError(CmpDesignError, ValueError):
-    """A source that names nothing, or cannot be opened."""
+    """A source that does not exist, or cannot be opened."""
 
 
 class SourceKind(Enum):
-    """What images come from."""
+    """The kind of a source of images."""
 
     IMAGES = "images"  # files, in order
     FILE = "file"  # a video, or an image of another ending
@@ -34,10 +34,10 @@ class SourceKind(Enum):
 
 @dataclass(frozen=True)
 class NamedSource:
-    """What one text, or several texts of pictures one after another, name.
+    """The source that one text, or several texts of pictures one after another, name.
 
     Attributes:
-        kind: what the images come from.
+        kind: kind of the source.
         name: the texts, for messages; without the password of an address.
         paths: the files of ``IMAGES`` and of ``FILE``, in natural order within a folder or pattern.
         address: number of a camera, or address of a stream.
@@ -50,7 +50,7 @@ class NamedSource:
 
 
 def name_sources(texts: Iterable[str]) -> list[NamedSource]:
-    """What the texts name, in their order; pictures that follow each other are one source.
+    """The sources that the texts name, in their order; consecutive pictures are one source.
 
     Args:
         texts: each a picture, a folder of pictures, a pattern such as "run*/*.png" ("**" for any folders), a video,
@@ -86,7 +86,7 @@ def picture_paths(texts: Iterable[str]) -> list[Path]:
 
 
 def without_password(text: str) -> str:
-    """A source's text as it may be shown: the address of a stream without user and password."""
+    """A source's text for messages: the address of a stream without user and password."""
     return re.sub(r"^([a-z]+://)[^/@]*@", r"\1", text, flags=re.IGNORECASE)
 
 
@@ -128,7 +128,7 @@ def _named_by(text: str) -> Sequence[NamedSource]:
 
 
 def _named_path(path: Path, name: str) -> NamedSource:
-    """A file is not opened here: whether it is there and can be read is found out when it is its turn."""
+    """The source of a file. The file is not opened here; a missing file is found when the file is read."""
     if is_folder(path):
         return NamedSource(SourceKind.IMAGES, name, tuple(find_images(path)))
     kind = SourceKind.IMAGES if path.suffix.lower() in IMAGE_SUFFIXES else SourceKind.FILE
@@ -136,12 +136,12 @@ def _named_path(path: Path, name: str) -> NamedSource:
 
 
 def _matching(pattern: str) -> list[NamedSource]:
-    """The files and folders that match a pattern, each as if it were named alone."""
+    """The files and folders that match a pattern, each as if named alone."""
     try:
         # Path.glob takes no pattern that begins at the root.
         names = glob.glob(pattern, recursive=True)  # noqa: PTH207
     except (OSError, ValueError, re.error) as error:
-        raise SourceError(f"{pattern}: is no pattern of file names ({error})") from None
+        raise SourceError(f"{pattern} is no pattern of file names ({error})") from None
     found = sorted(map(Path, names), key=_natural_sort_key)
     # "**" also matches the folders above the files, which are not named alone then.
     files = [path for path in found if not is_folder(path)]
@@ -151,7 +151,7 @@ def _matching(pattern: str) -> list[NamedSource]:
 
 
 def _natural_sort_key(path: Path) -> list[tuple[int, int | str]]:
-    """The key of the natural order: frame2 before frame10; the files of a folder stand together."""
+    """The key of the natural order: frame2 before frame10; the files of a folder follow each other."""
     key: list[tuple[int, int | str]] = []
     digits = ""
     for letter in f"{path.parent}\0{path.name}\0":

@@ -1,4 +1,4 @@
-"""Foreign texts, made printable: texts of files, paths and options may hold escape sequences and line breaks."""
+"""Printable forms of texts: texts of files, paths and options may hold escape sequences and line breaks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 
 
 def visible(text: str, keep: str = "") -> str:
-    r"""The text with every unprintable character escaped as in JSON, but for those in ``keep``.
+    r"""The text with every unprintable character escaped as in JSON, except the characters in ``keep``.
 
     >>> visible("a\x1b[31mb")
     'a\\u001b[31mb'

@@ -1,4 +1,4 @@
-"""The errors of pydantic as one line that names each field, its value, and the nearest known name."""
+"""The errors of pydantic as one line with each field, its value, and the nearest known name."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def validation_message(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def shown_value(value: object) -> str:
-    """A value on one short line; of a table or a long list only its kind and size."""
+    """A value on one short line; of a table or a long list only kind and size."""
     match value:
         case Mapping():
             return f"a table of {len(value)} fields"
@@ -59,7 +59,7 @@ def _item_message(item: Any, model: type[BaseModel]) -> str:
 
 
 def _known_names(model: Any, path: tuple[int | str, ...]) -> tuple[str, ...]:
-    """The fields of the table at a path of names; none where any name is allowed."""
+    """The fields of the table at a path of names; empty where any name is allowed."""
     annotation: Any = model
     for part in path:
         table = _table_class(annotation)

@@ -96,7 +96,7 @@ def _clip_graph(design: Design, graph: MarkerGraph, xy_mm: Points) -> MarkerGrap
     if not keep[graph.reference_cell]:
         raise DesignError(
             f"the {design.clip} clip outline, less a border of {design.border_mm:g} mm, cuts the reference "
-            "cell away: nothing could be numbered; make the outline larger or the pitch smaller"
+            "cell away: no marker could be numbered; make the outline larger or the pitch smaller"
         )
     if not _is_reference_surrounded(graph, keep):
         raise DesignError(
@@ -108,7 +108,7 @@ def _clip_graph(design: Design, graph: MarkerGraph, xy_mm: Points) -> MarkerGrap
 
 
 def _is_reference_surrounded(graph: MarkerGraph, keep: NDArray[np.bool_]) -> bool:
-    """True when every cell that shares a side with the reference cell is kept. Numbering starts from these cells."""
+    """True when every cell that shares a side with the reference cell is kept. Numbering starts at these cells."""
     shared = np.isin(graph.corners, graph.corners[graph.reference_cell]).sum(axis=1)
     return bool(keep[shared >= 2].all())
 

@@ -34,9 +34,9 @@ WHITE_SATURATION_ERROR, WHITE_VALUE_ERROR = 0.2, 0.6
 # edge that is tested at every rotation and tilt.
 CAMERA_PX = (640, 480)
 EDGE_ERROR_PX, EDGE_WARNING_PX = 6.0, 12.0
-# Without a black border, the other side of the rim's gridlines is whatever lies behind the pattern.
+# Without a black border, the background is on the other side of the rim's gridlines.
 BORDER_WARNING_PITCHES = 0.25
-# Markers removed by the clip outline still occupy every array. A hexagon around a rectangle loses half.
+# Markers removed by the clip outline still have entries in every array. A hexagon around a rectangle loses half.
 PRESENT_WARNING = 0.33
 
 
@@ -113,7 +113,7 @@ def _size_findings(design: Design, layout: Layout) -> Iterator[Finding]:
 
 
 def _larger_cells_remedy(design: Design) -> str:
-    """What makes cells larger: with a given pitch the pitch alone, with an overall size also fewer layers."""
+    """The remedy for small cells: with a given pitch a larger pitch, with an overall size also fewer layers."""
     if design.pitch_mm is not None:
         return "make pitch_mm larger"
     sizes = [name for name in ("width_mm", "height_mm") if getattr(design, name) is not None]
@@ -156,7 +156,7 @@ def _structure_findings(design: Design, layout: Layout) -> Iterator[Finding]:
             layers,
             2,
             "",
-            "use two layers or more, or orientation rests on two cells",
+            "use two layers or more; with one layer, two cells alone fix the orientation",
             "warning",
         )
     yield from _findings_below(
@@ -173,7 +173,7 @@ def _structure_findings(design: Design, layout: Layout) -> Iterator[Finding]:
         None,
         PRESENT_WARNING,
         "",
-        "use fewer layers: the others are numbered but never seen",
+        "use fewer layers: the outer layers are numbered but not visible",
     )
 
 

@@ -20,12 +20,12 @@ DECIMALS = 9
 
 @dataclass(frozen=True, eq=False)
 class AsMade:
-    """How a made pad differs from the layout that it was made after. The layout's markers are where they were made.
+    """The differences of a made pad from its nominal layout. The layout's markers are at the places as made.
 
     Attributes:
         of: digest of the nominal layout.
-        product: what made the pad: "laser", "mold", "print"; "measured" where pictures of the pad tell.
-        side: side of the pattern that was measured, or whose outlines these are: "front" or "back".
+        product: product that made the pad: "laser", "mold", "print"; "measured" for a layout from pictures of the pad.
+        side: side of the measurement or of the outlines: "front" or "back".
         outlines_mm: (N, K, 2) float64, layout frame: outline of every cell that is not black, in the layout's order,
             counter-clockwise from the front; shorter outlines repeat their last point. None: triangles between the
             markers.
@@ -51,7 +51,7 @@ class Layout:
 
     Attributes:
         pattern: the registered pattern's name.
-        parameters: the design's parameters, resolved; ``mirrored``: the camera looks at the pattern's back.
+        parameters: the design's parameters, resolved; ``mirrored``: the camera sees the pattern's back.
         marker_layer, marker_index: (M,) int32; a marker's position in the arrays is its id.
         marker_xy_mm: (M, 2) float64, rounded to 1e-9 mm.
         cell_corners: (C, 3) int32 (square: (C, 4)), marker ids counter-clockwise from the front.
@@ -65,7 +65,7 @@ class Layout:
             first point not repeated.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
         fiducial_diameter_mm: the marks' diameter.
-        as_made: where and how a pad was made; None: as designed.
+        as_made: differences of a made pad from the design; None: as designed.
     """
 
     pattern: str
@@ -111,7 +111,7 @@ class Layout:
 
     @property
     def mirrored(self) -> bool:
-        """True when the camera looks at the pattern's back."""
+        """True when the camera sees the pattern's back."""
         return bool(self.parameters.get("mirrored", False))
 
     @cached_property
@@ -135,7 +135,7 @@ class Layout:
 
     @cached_property
     def colored_outlines_mm(self) -> NDArray[np.float64]:
-        """(N, K, 2) outlines of the ``colored_cells``: as made where this is known, else their corners."""
+        """(N, K, 2) outlines of the ``colored_cells``: as made where known, else the cells' corners."""
         if self.as_made is not None and self.as_made.outlines_mm is not None:
             return self.as_made.outlines_mm
         outlines: NDArray[np.float64] = self.marker_xy_mm[self.cell_corners[self.colored_cells]]

@@ -1,4 +1,4 @@
-"""What a layout's cells and edges measure."""
+"""Lengths, areas and angles of a layout's cells and edges."""
 
 from __future__ import annotations
 

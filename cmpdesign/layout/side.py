@@ -1,4 +1,4 @@
-"""The side of the pattern that the camera sees, and the pattern as it lies when this side is turned up."""
+"""The side of the pattern that the camera sees, and the pattern with this side up."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ Side = Literal["front", "back"]
 
 
 def seen_side(mirrored: bool) -> Side:
-    """The side that the camera sees: the back for ``mirrored``, else the front. Every product asks here."""
+    """The side that the camera sees: the back for ``mirrored``, else the front. Every product uses this function."""
     return "back" if mirrored else "front"
 
 
 def turned_over(layout: Layout) -> Layout:
-    """The layout as its back shows it: x is mirrored; ids, colors and edges stay, corners stay counter-clockwise."""
+    """The layout as seen from the back: x is mirrored; ids, colors and edges are kept; corners are
+    counter-clockwise.
+    """
     mirror = np.array([-1.0, 1.0])
     return replace(
         layout,

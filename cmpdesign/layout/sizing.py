@@ -68,7 +68,7 @@ def fitting_pitch_mm(design: Design, shape: PatternShape) -> float:
         if border_only_mm >= limit_mm:
             name = ("width_mm", "height_mm")[axis]
             raise DesignError(
-                f"{name} = {limit_mm:g} mm leaves nothing inside the border, which alone takes "
+                f"{name} = {limit_mm:g} mm leaves no area inside the border, which alone takes "
                 f"{border_only_mm:.3g} mm; make it larger or border_mm smaller"
             )
         pitches.append(_largest_pitch(corners[:, axis], border[:, axis], limit_mm))
@@ -142,7 +142,7 @@ def _fitting_layers(design: Design) -> int:
 
     if not fits(1):
         raise DesignError(
-            f"not one layer of pitch_mm = {design.pitch_mm:g} mm fits the overall size; "
+            f"no layer of pitch_mm = {design.pitch_mm:g} mm fits the overall size; "
             f"the largest pitch that fits is {fitting_pitch_mm(design, _make_shape(design, 1)):.4g} mm"
         )
     return _largest_layers(fits)

@@ -1,4 +1,4 @@
-// The module `cmpdesign._native`: a submodule for each subject that has loops.
+// The module `cmpdesign._native`: a submodule for each subject with loops.
 #include "base/binding.hpp"
 
 namespace cmp {

@@ -37,8 +37,8 @@ def _angle_from_arc(turn: NDArray[np.float64], aspect: float) -> NDArray[np.floa
     """The parameter angle t in rad at which the arc from 0 to t is the share ``turn`` of the perimeter.
 
     The speed of (cos t, aspect sin t) is even and has the period pi. The terms of its cosine series are integrated one
-    by one; they fall at least as 0.6^k for aspects from 1/4 to 4, so that what is left out is below 1e-17 of the arc.
-    Newton's method applies because the derivative of the arc never vanishes.
+    by one; they fall at least as 0.6^k for aspects from 1/4 to 4, so that the omitted terms are below 1e-17 of the arc.
+    Newton's method converges because the derivative of the arc is never zero.
     """
     samples = np.pi * np.arange(ARC_SAMPLES) / ARC_SAMPLES
     cosines = np.fft.rfft(_speed(samples, aspect)).real / ARC_SAMPLES

@@ -1,6 +1,6 @@
 """Graphs of patterns: markers, cells, colors and the rim, without positions.
 
-A pattern embeds one of these graphs. ``TRIANGULAR_GRAPHS`` is the multicolor CMP, ``SQUARE_GRAPHS`` its predecessor.
+A pattern embeds one of these graphs. ``TRIANGULAR_GRAPHS`` is the multicolor CMP, ``SQUARE_GRAPHS`` the former CMP.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A design's files written, and a design judged before it is made: what ``build`` and ``check`` do."""
+"""Writing of a design's files, and checks of a design: the work of ``build`` and ``check``."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """What a build wrote.
+    """The files and findings of a build.
 
     Attributes:
         written: the files of the design, in the order of the products.
         removed: files of an earlier build that this build does not make.
         report: the design's key figures.
-        readings: name of a product -> what the extractor reads of its pad.
-        findings: what will not or may not work, of the design and of its products.
+        readings: name of a product -> the extractor's reading of its pad.
+        findings: features of the design and its products that will not or may not work.
         of_other_designs: files in the folder that belong to another design.
     """
 
@@ -50,7 +50,7 @@ class Checked:
 
     Attributes:
         findings: errors first.
-        readings: name of a product -> what the extractor reads of its pad; empty unless pads were read.
+        readings: name of a product -> the extractor's reading of its pad; empty unless pads were read.
         unread: name of a product -> why its pad cannot be made and is not read.
     """
 
@@ -82,8 +82,8 @@ def build_files(
         folder: folder for the files; made if missing.
         names: products to make, see ``chosen_products``.
         camera_px: width and height of the camera image that the pattern fills.
-        preset: the extractor's, for the reading of pads.
-        watch: called with the name of every step before it.
+        preset: preset of the extractor, for the reading of pads.
+        watch: called with the name of every step, before the step.
 
     Raises:
         CmpDesignError: a product cannot be made; no file has been written.
@@ -121,7 +121,7 @@ def check_products(
     read: bool = False,
     preset: Preset = "balanced",
 ) -> Checked:
-    """What cannot be made or read of a design.
+    """The features of a design that cannot be made or read.
 
     Args:
         design, layout, camera_px, preset: see ``build_files``.

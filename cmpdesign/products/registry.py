@@ -37,7 +37,7 @@ class ProductFiles:
         figures: measures of the product as JSON values; the product's member in ``report.json``.
         findings: errors and warnings about the product.
         pictures: name -> (H, W, 3) uint8 BGR picture of the product, shown in ``preview.png``.
-        made_pad: the pad that the product makes, which is read before the files are written; None without a pad.
+        made_pad: the pad that the product makes; the pad is read before the files are written; None without a pad.
     """
 
     files: Mapping[str, str | bytes]
@@ -59,7 +59,7 @@ class MadeProducts:
     Attributes:
         files: all files by relative path, in the registry's order.
         findings: findings of the products and of the reading of their pads.
-        readings: name of a product -> what the extractor reads of its pad.
+        readings: name of a product -> the extractor's reading of its pad.
     """
 
     files: dict[str, str | bytes]
@@ -141,9 +141,9 @@ def make_products(
     preset: Preset = "balanced",
     watch: Callable[[str], None] = lambda name: None,
 ) -> MadeProducts:
-    """Make the named products, and read their pads as a camera of ``camera_px`` (width, height) sees them.
+    """Make the named products, and read their pads in the picture of a camera of ``camera_px`` (width, height).
 
-    ``preset`` is the extractor's; ``watch`` is called with the name of every step before it.
+    ``preset`` is the preset of the extractor; ``watch`` is called with the name of every step, before the step.
 
     ``report.json`` is also made when a named product has figures, and ``preview.png`` when one has pictures.
 
@@ -186,7 +186,7 @@ def make_products(
 
 
 def pads_as_made(design: Design, layout: Layout) -> tuple[list[MadePad], dict[str, str]]:
-    """The pads of all products that make one, without the products' files.
+    """The pads of all products that make a pad, without the products' files.
 
     Returns:
         The pads, and for each product that cannot be made its name and the reason.

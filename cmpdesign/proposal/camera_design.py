@@ -1,4 +1,4 @@
-"""The finest pattern that a camera reads on its field of view, with the error and the resolution that it gives."""
+"""The finest pattern that a camera reads on its field of view, with the error and the resolution of the pattern."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from cmpdesign.patterns.graphs import MAX_LAYERS
 from cmpdesign.proposal.predicted_error import Imaging, PredictedError, predict_error
 from cmpdesign.units import LENGTHS_MM, parse_length_mm
 
-# Width of the black border: twice the least width that `check` accepts, so that a pad may lie off the view's middle.
+# Width of the black border: twice the smallest width that `check` accepts, so that the pad need not be centred in the
+# view.
 BORDER_PITCHES = 0.5
 # The white cell's third neighbour lies in layer 2.
 FEWEST_LAYERS = 2
@@ -48,11 +49,11 @@ class Proposal:
     Attributes:
         design: the design; ``design.write("out")`` makes its files.
         camera: width and height, px.
-        view: width and height of what the camera sees of the pattern's plane, mm.
+        view: width and height of the field of view in the pattern's plane, mm.
         scale_px_per_mm: pixels in a millimetre, by the tighter of the two sides.
         pitch_px: pixels from marker to marker.
         error: predicted standard deviation per marker and axis, px.
-        limit: what keeps the pattern from being finer: "pixels", "cells" (that can be made), "layers" or "error".
+        limit: limit that a finer pattern would exceed: "pixels", "cells" (that can be made), "layers" or "error".
     """
 
     design: Design
@@ -77,8 +78,8 @@ class Proposal:
     def told_apart_mm(self) -> float:
         """Smallest distance at which two equal objects are told apart in any direction: a period of sqrt(3) pitches.
 
-        A triangular lattice resolves every longer period and no shorter one in all directions. What the soft layer
-        between objects and pattern spreads comes on top.
+        A triangular lattice resolves every longer period, and no shorter period in all directions. The blur by the soft
+        layer between objects and pattern is not included.
         """
         assert self.design.pitch_mm is not None
         return PERIOD_PITCHES * self.design.pitch_mm
@@ -153,23 +154,25 @@ def size(
     blur_px: float = 1.0,
     noise: float = 2.0,
 ) -> Proposal:
-    """Which pitch and how many layers suit a camera and its field of view, as the command ``size`` says it.
+    """Propose pitch and layers for a camera and its field of view, as the command ``size`` does.
 
     The pattern is the finest that fits the view and is read well: the error per marker grows with finer patterns, the
-    distance at which objects are told apart falls. With ``error`` it is the finest whose markers have that error.
+    distance at which objects are told apart falls. With ``error``, the pattern is the finest whose markers have this
+    error.
 
     >>> proposal = cmpdesign.size("1280x960", "24x18mm", "0.2um")
     >>> proposal.design.write("out")
 
     Args:
         camera: pixels, width and height: (1280, 960) or "1280x960".
-        view: what the camera sees of the pattern's plane, width and height: mm, or a text such as "24x18mm".
+        view: width and height of the field of view in the pattern's plane: mm, or a text such as "24x18mm".
         error: largest standard deviation of an inner marker, per axis: mm, or a text such as "0.2um".
-        blur_px: sigma of the Gaussian blur that optics and pixel make together.
-        noise: of the camera, standard deviation in 255ths.
+        blur_px: sigma of the Gaussian blur of optics and pixel together.
+        noise: standard deviation of the camera's noise, in 255ths.
 
     Raises:
-        CmpDesignError: a value out of range, or a demand that the camera cannot meet; the message says what can be met.
+        CmpDesignError: a value out of range, or an error that the camera cannot reach; the message states the smallest
+            error.
     """
     pixels, seen_mm = _pixels(camera), _view_mm(view)
     imaging = Imaging(
@@ -207,14 +210,16 @@ def size(
 
 
 class _Fit(NamedTuple):
-    """The largest pitch, mm, at which a number of layers fits the view, and the turn at which it does."""
+    """The largest pitch, mm, at which a number of layers fits the view, and the turn of the pattern."""
 
     pitch_mm: float
     rotation_deg: float
 
 
 def _fitting(layers: int, view_mm: Sides) -> _Fit:
-    """The largest pitch at which a honeycomb of so many layers fits the view with its border, lying or standing."""
+    """The largest pitch at which a honeycomb of this number of layers fits the view with its border, lying or
+    standing.
+    """
     long = 2 * layers + 2 * BORDER_PITCHES / math.cos(math.radians(30))
     short = math.sqrt(3) * layers + 2 * BORDER_PITCHES
     lying = min(view_mm.width / long, view_mm.height / short)
@@ -225,10 +230,10 @@ def _fitting(layers: int, view_mm: Sides) -> _Fit:
 
 
 def _finest_layers(pixels: Sides, view_mm: Sides, scale: float) -> tuple[int, Limit]:
-    """The most layers that are read and made well, and what limits them.
+    """The largest number of layers that are read and made well, and the limit.
 
     Raises:
-        CmpDesignError: not even the fewest layers are.
+        CmpDesignError: the smallest number of layers is not.
     """
     smallest_mm = CELL_WARNING_MM / CELL_PITCHES
     pitch_mm = _fitting(FEWEST_LAYERS, view_mm).pitch_mm
@@ -256,7 +261,7 @@ def _finest_layers(pixels: Sides, view_mm: Sides, scale: float) -> tuple[int, Li
 
 
 def _coarser(wanted_px: float, finest: int, predicted: Any) -> int:
-    """The most layers below the finest whose predicted error is not above the wanted one; 1 if there are none."""
+    """The largest number of layers whose predicted error is not above the wanted error; 1 if there is none."""
     low, high = FEWEST_LAYERS - 1, finest
     while high - low > 1:
         middle = (low + high) // 2

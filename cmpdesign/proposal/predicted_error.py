@@ -21,11 +21,11 @@ from cmpdesign.scene.parts.optics import Optics
 from cmpdesign.scene.parts.sensor import Sensor
 from cmpdesign.scene.scene import Scene
 
-# The exact bound needs a hundred renderings, so it is taken of a small pattern, at a whole pitch that is not above this
-# one, as a factor on the bound of isolated gridlines. The factor falls with the pitch, to 1.05 at 30 px: the prediction
-# at larger pitches is too high by less than a tenth.
+# The exact bound needs a hundred renderings. Therefore the bound of a small pattern, at a whole pitch not above this
+# pitch, is used as a factor on the bound of isolated gridlines. The factor falls with the pitch, to 1.05 at 30 px: the
+# prediction at larger pitches is too high by less than a tenth.
 EXACT_LAYERS, EXACT_PITCH_PX = 3, 20
-# The inner markers of so many layers have the gridline bound of those of any larger pattern.
+# With this number of layers, the inner markers have the gridline bound of the inner markers of any larger pattern.
 GRIDLINE_LAYERS = 8
 Points = NDArray[np.float64]
 # A turn at which no gridline lies along a row of pixels.
@@ -34,10 +34,10 @@ TURN_DEG = 7.3
 
 @dataclass(frozen=True)
 class Imaging:
-    """How a camera sees the pattern.
+    """Properties of a camera's picture of the pattern.
 
     Attributes:
-        blur_px: sigma of the Gaussian blur that optics and pixel make together.
+        blur_px: sigma of the Gaussian blur of optics and pixel together.
         noise: standard deviation in 255ths.
     """
 

@@ -1,7 +1,7 @@
-"""The pattern in an image that does not fit the layout: how many layers it has.
+"""The number of layers of a pattern in an image that does not fit the layout.
 
 A pattern of more layers than the layout has hides the white cell from a search by the layout, and a pattern of fewer
-layers leaves the outer markers unseen. The count is proved by reading the image with a pattern of so many layers.
+layers has no outer markers. The number is confirmed by a reading of the image with a pattern of this number of layers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CELLS_PER_LAYERS_SQUARED = 3
 
 
 def other_pattern_reason(reference: Reference, image: Image, markers: Markers) -> str | None:
-    """One sentence on a pattern of another number of layers; None if the image does not prove such a pattern.
+    """One sentence on a pattern of another number of layers; None if the image does not confirm another number.
 
     Args:
         reference: the layout, of triangles.
@@ -41,7 +41,7 @@ def other_pattern_reason(reference: Reference, image: Image, markers: Markers) -
     if layers is None or layers == reference.layers:
         return None
     return (
-        f"the pattern seen does not fit the layout: it has {layers} layers, the layout {reference.layers}; "
+        f"the pattern in the picture does not fit the layout: it has {layers} layers, the layout {reference.layers}; "
         "give the layout of this pattern"
     )
 
@@ -49,7 +49,7 @@ def other_pattern_reason(reference: Reference, image: Image, markers: Markers) -
 def _layers_measured(reference: Reference, image: Image, markers: Markers) -> int | None:
     """The number of layers, where nearly all markers up to one layer are measured and no marker beyond; else None.
 
-    The pattern must end within the image: the next layer would lie within it, too.
+    The pattern must end within the image: the next layer would lie within the image, too.
     """
     found = np.isfinite(markers.xy_px[:, 0])
     if not found.any():
@@ -67,7 +67,9 @@ def _layers_measured(reference: Reference, image: Image, markers: Markers) -> in
 
 
 def _layers_counted(image: Image, markers: Markers) -> int | None:
-    """The number of layers by the count of cells, where an extraction by so many layers proves it; else None."""
+    """The number of layers by the count of cells, where an extraction with this number confirms the number; else
+    None.
+    """
     from extractor import Extractor, parse_layout
 
     cells = markers.stages.get("cells")

@@ -1,9 +1,9 @@
-"""The bundle of a problem with pictures: all that is needed to see the problem again, in one ZIP file.
+"""The bundle of a problem with pictures: all files that are needed to repeat the reading, in one ZIP file.
 
     report.json          format, version, settings, versions of the programs, pictures with their verdicts
-    layout.json          the layout that the pictures were read with
+    layout.json          the layout of the reading
     pictures/NAME        the pictures, as they were given
-    stages/NAME/N-STAGE.png   what each stage of the extraction found
+    stages/NAME/N-STAGE.png   the result of each stage of the extraction
 
 ``python -m tools.adopt_report report.zip`` makes a test of a bundle.
 """
@@ -24,10 +24,11 @@ from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import Image, to_png
+from cmpdesign.libraries import OPENCV_DISTRIBUTIONS
 
 FORMAT, VERSION = "cmp-problem-report", 1
 MOST_PICTURES = 20
-_LIBRARIES = ("numpy", "opencv-contrib-python-headless", "opencv-python-headless", "opencv-python", "scipy")
+_LIBRARIES = ("numpy", *OPENCV_DISTRIBUTIONS, "scipy")
 _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same bundle has the same bytes
 
 
@@ -36,7 +37,7 @@ class ProblemReport:
 
     Args:
         layout_text: text of the layout file.
-        settings: options that decide what is read, as JSON values.
+        settings: options of the reading, as JSON values.
     """
 
     def __init__(self, layout_text: str, settings: Mapping[str, Any]) -> None:
@@ -48,10 +49,10 @@ class ProblemReport:
         """Add a picture.
 
         Args:
-            name: of the picture's file, without a folder; of each picture another one.
-            content: of that file.
-            verdict: on the picture, as JSON values.
-            stages: name of a stage -> (H, W, 3) BGR picture of what the stage found.
+            name: name of the picture's file, without a folder; different for each picture.
+            content: content of the file.
+            verdict: verdict on the picture, as JSON values.
+            stages: name of a stage -> (H, W, 3) BGR picture of the stage's result.
 
         Raises:
             CmpDesignError: there are ``MOST_PICTURES`` pictures already.
@@ -75,7 +76,7 @@ class ProblemReport:
             OutputError: the file cannot be written.
         """
         if not self._pictures:
-            raise CmpDesignError(f"{path}: no picture could be read, so that there is nothing to report")
+            raise CmpDesignError(f"{path}: no picture could be read, so there is no content for the report")
         document = {
             "format": FORMAT,
             "version": VERSION,

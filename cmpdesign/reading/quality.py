@@ -1,4 +1,4 @@
-"""The quality of images, as reports show it."""
+"""The quality of images, for reports."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def quality_to_json(quality: Quality | None) -> dict[str, Any] | None:
 
 
 def quality_text(quality: Mapping[str, Any]) -> str:
-    """One line on a quality as ``quality_to_json`` gives it."""
+    """One line on a quality from ``quality_to_json``."""
     if quality["contrast"] is None:
         return "unknown"
     inks = " and ".join(quality["weakest_inks"])
@@ -39,7 +39,7 @@ def quality_text(quality: Mapping[str, Any]) -> str:
 
 
 def reasons_text(reasons: Mapping[str, int]) -> str:
-    """Counted reasons of frames, those of the extractor in words."""
+    """Counted reasons of frames; reasons of the extractor in words."""
     from extractor import Reason
 
     codes = set(Reason)
@@ -49,7 +49,9 @@ def reasons_text(reasons: Mapping[str, int]) -> str:
 
 
 def median_quality(qualities: Sequence[Quality]) -> Quality | None:
-    """Each property's median over images, and the inks that differ least most often; None without images."""
+    """Each property's median over images, and the two inks that most often have the smallest contrast; None without
+    images.
+    """
     from extractor.quality import Quality
 
     if not qualities:

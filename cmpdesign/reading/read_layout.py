@@ -1,4 +1,4 @@
-"""Reading of a layout file as a ``Layout``, so that scenes show the pattern as printed."""
+"""Reading of a layout file as a ``Layout``, for scenes of the pattern as printed."""
 
 from __future__ import annotations
 

@@ -84,11 +84,11 @@ class Verdict:
 
 
 def verify(extractor: Extractor, reference: Reference, image: Image, min_share: float = MIN_SHARE) -> Verdict:
-    """Extract the markers of one image and judge them.
+    """Extract the markers of one image and give a verdict.
 
     Args:
-        extractor: extractor for ``reference``; with ``side="either"`` it reads both sides, and the verdict tells them
-            apart.
+        extractor: extractor for ``reference``; with ``side="either"`` the extractor reads both sides, and the verdict
+            distinguishes them.
         reference: the layout.
         image: (H, W, 3) BGR, uint8 or uint16.
         min_share: least share of the present markers that must be measured, 0 to 1.

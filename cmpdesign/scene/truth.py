@@ -30,7 +30,7 @@ class Truth:
         virtual_xy_px*: (E, m, 2) float64, on the true, curved gridlines; from the smaller marker id.
         cell_visible*: (C,) bool: all corners inside the image and the cell undamaged: not missing, and less
             than half of it under dirt or glare.
-        mirrored*: the camera looks at the pattern's back.
+        mirrored*: the camera sees the pattern's back.
         H*: (3, 3) float64 image-from-layout; None when a surface is not flat or a lens distorts.
         marker_xyz_mm: (M, 3) float64, the surface in the layout frame; z is 0 on a flat surface.
         virtual_xyz_mm: (E, m, 3) float64.

@@ -1,4 +1,4 @@
-"""The columns that the tables of tracking and of reconstruction share, and the interface of a table."""
+"""The columns that are common to the tables of tracking and of reconstruction, and the interface of a table."""
 
 from __future__ import annotations
 

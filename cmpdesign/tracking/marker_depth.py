@@ -1,4 +1,4 @@
-"""What a rig file says of the place of the pattern: how far it lies below the touched surface, and of which layer."""
+"""The depth of the pattern below the touched surface, and the elastic layer, from a rig file."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def read_elastomer(path: Path) -> Elastomer:
     table = _read_table(path)
     if table is None or "thickness_mm" not in table:
         raise CmpDesignError(
-            f"{path}: has no [elastomer] with thickness_mm, which the touched surface is computed with; "
+            f"{path} has no [elastomer] with thickness_mm, which is needed to compute the touched surface; "
             "add thickness_mm, marker_depth_mm and poisson, or leave out --surface"
         )
     lengths = {

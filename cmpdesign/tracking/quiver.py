@@ -29,8 +29,8 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
     """Draw the gridlines at rest and an arrow for every marker with a displacement.
 
     Arrows have the direction of the image. They are magnified by the integer factor in the caption and colored by
-    their length. A circle beside the caption has the radius of the noise, magnified as the arrows are; noise alone is
-    not magnified to arrows that look like a motion.
+    their length. A circle beside the caption has the radius of the noise, magnified like the arrows; noise alone is
+    not magnified to visible arrows.
 
     Returns:
         (H, W, 3) uint8 BGR.
@@ -65,7 +65,8 @@ def _drawing_scale(xy_px: NDArray[np.float64]) -> tuple[float, NDArray[np.float6
 
 
 def displacement_sigma_px(frame: Tracked) -> float:
-    """The standard deviation of a displacement per axis: that of the frame's measured markers, and as much at rest.
+    """The standard deviation of a displacement per axis: from the frame's measured markers, with the same deviation at
+    rest.
 
     0 where no marker is measured.
     """

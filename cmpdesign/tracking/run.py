@@ -45,8 +45,8 @@ class TrackingRun:
         limit: largest number of frames, if any.
         ended_early: reason for an early end; "" if all frames were tracked.
         stop: request to stop.
-        warnings: what makes the results doubtful.
-        live: live viewer of the tracked frames, if any; no failure of it ends the run.
+        warnings: reasons to doubt the results.
+        live: live viewer of the tracked frames, if any; a failure of the viewer does not end the run.
     """
 
     source: FrameSource
@@ -77,7 +77,7 @@ class TrackingRun:
             raise OutputError("; ".join(dict.fromkeys((*failures, self.sink.kept()))))
 
     def _wait_for_viewer(self) -> None:
-        """Wait until somebody looks, the time for it is over, or a stop is requested."""
+        """Wait until a viewer is connected, the waiting time is over, or a stop is requested."""
         end = time.monotonic() + (self.live.wait_s if self.live is not None else 0.0)
         while self.live is not None and not self.stop.is_requested and time.monotonic() < end:
             if self.live.wait(WAIT_STEP_S):
@@ -95,14 +95,14 @@ class TrackingRun:
                 self.overlay.add(frame.image, tracked, self.tracker.rest)
             watch(tracked)
             if self.stop.is_requested:
-                self.ended_early = f"stopped by hand after {self.statistics.frames} frames"
+                self.ended_early = f"stopped by Ctrl-C after {self.statistics.frames} frames"
                 return
             if self.limit is not None and self.statistics.frames >= self.limit:
                 return
         self.ended_early = self.source.ended_early
 
     def _close_files(self) -> list[str]:
-        """Complete each file, also after a failure of another file; the failures."""
+        """Complete each file, also after a failure of another file; return the failures."""
         failures = []
         for writer in (self.sink, self.overlay):
             try:
@@ -145,7 +145,7 @@ def read_rest_markers(
         text: number of a frame of the source, or path of an image file.
         source: the source, see ``open_source``.
         fps: see ``open_source``.
-        tracker: a new tracker; it reads the image as a tracker like it reads the frames.
+        tracker: a new tracker with the options of the run; it reads the image.
         most_pixels: see ``open_source``.
 
     Raises:
@@ -154,7 +154,9 @@ def read_rest_markers(
     markers = tracker.track(read_rest_image(text, source, fps, most_pixels)).markers
     if not markers.found:
         name = f"frame {text}" if text.isdecimal() else text
-        raise CmpDesignError(f"at rest: no pattern is found in {name} ({_why(markers)}); choose another")
+        raise CmpDesignError(
+            f"at rest: no pattern is found in {name} ({_why(markers)}); choose another image"
+        )
     return markers
 
 
@@ -177,7 +179,7 @@ def read_rest_image(
     )
     if image is None:
         name = f"frame {text}" if text.isdecimal() else text
-        raise CmpDesignError(f"at rest: {name} cannot be read; choose another")
+        raise CmpDesignError(f"at rest: {name} cannot be read; choose another image")
     return image
 
 

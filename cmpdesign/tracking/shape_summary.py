@@ -26,7 +26,7 @@ class ShapeStatistics:
     """The statistics of a reconstructor's frames.
 
     Args:
-        reconstructor: what reconstructs them.
+        reconstructor: the reconstructor of the frames.
         marker_depth_mm: depth of the pattern below the touched surface; None: not known.
         is_continued: the table holds the touched surface, too.
     """

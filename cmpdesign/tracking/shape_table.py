@@ -29,7 +29,7 @@ class ShapeTable:
 
     Args:
         reconstructor: its layout, poses and rest frame are the shared columns.
-        continuation: continues the markers' displacements to the touched surface, for four more columns; None: not
+        continuation: continues the markers' displacements to the touched surface, for further columns; None: not
             wanted.
     """
 

@@ -1,4 +1,4 @@
-"""The images of sources one by one, each with a name of its own; what cannot be read keeps its place."""
+"""The images of sources one by one, each with a unique name; an unreadable image keeps its place."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class SourceImage:
 
     Attributes:
         name: its path, or the source's name and the number of the frame.
-        stem: a name for files that belong to the image; of all images of a run, each has another.
+        stem: a name for files that belong to the image; unique among all images of a run.
         image: (H, W, 3) BGR, uint8 or uint16; None where it cannot be read.
         problem: reason for a missing image, or "".
-        path: its own file; None of a frame of a video, a camera or a stream.
+        path: the image's own file; None for a frame of a video, a camera or a stream.
     """
 
     name: str
@@ -40,7 +40,7 @@ class SourceImage:
     path: Path | None
 
     def picture(self) -> Picture:
-        """The image's own file as it is; of a frame, a PNG.
+        """The image's own file, unchanged; for a frame, a PNG.
 
         Raises:
             InputError: the file can no longer be read.
@@ -51,7 +51,7 @@ class SourceImage:
 
 
 def count_images(sources: Iterable[NamedSource], frames: int | None) -> int | None:
-    """The number of images of ``source_images``; None where a video does not say how many frames it has.
+    """The number of images of ``source_images``; None where a video does not state its number of frames.
 
     Args:
         sources: from ``name_sources``.
@@ -77,7 +77,7 @@ def source_images(
 
     Args:
         sources: from ``name_sources``.
-        frames: number of frames of each video, camera or stream; None: all of a video, one of the others.
+        frames: number of frames of each video, camera or stream; None: all of a video, one of a camera or stream.
         most_pixels: limit of width x height of an image or of a frame.
     """
     stems: set[str] = set()
@@ -107,7 +107,7 @@ def _stem_of(source: NamedSource) -> str:
 
 
 def _new_stem(stem: str, taken: set[str]) -> str:
-    """The stem, numbered where an image before has it."""
+    """The stem, numbered where an earlier image has the same stem."""
     name, number = stem, 1
     while name in taken:
         number += 1

@@ -15,9 +15,9 @@ from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind, is_st
 
 DEFAULT_FPS = 30.0
 MAX_FAILED_READS = 10  # consecutive failures after which a stream counts as ended
-PHOTO_SUFFIXES = frozenset({".heic", ".heif", ".avif", ".dng"})  # what phones write beside JPEG
-MOST_DELAY_S = 1.0  # from a camera's time stamp to the arrival; beyond it, the stamps are of another clock
-STREAM_TIMEOUT_MS = 4000  # for opening and reading; a stop waits no longer
+PHOTO_SUFFIXES = frozenset({".heic", ".heif", ".avif", ".dng"})  # formats of phones other than JPEG
+MOST_DELAY_S = 1.0  # from a camera's time stamp to the arrival; a longer time means stamps of another clock
+STREAM_TIMEOUT_MS = 4000  # for opening and reading; a stop waits at most this time
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class SourceFrame:
         time_s: time stamp.
         image: (H, W, 3) BGR, or None; of several views a list of these.
         problem: reason for a missing image, or "".
-        path: the image's own file; None of a frame of a video, a camera or a stream, and of several views.
+        path: the image's own file; None for a frame of a video, a camera or a stream, and for several views.
     """
 
     time_s: float
@@ -51,7 +51,7 @@ class FrameSource(Protocol):
         total: number of frames that the source declares; None if unknown.
         fps: frames per second; None if unknown.
         ended_early: after the last frame, the reason for an early end; "" if all frames were read.
-        is_live: the frames come as they are taken: no number is declared, and only a stop ends them.
+        is_live: the frames are read while they are taken: no number is declared, and only a stop ends the source.
     """
 
     name: str
@@ -66,11 +66,12 @@ class FrameSource(Protocol):
 def open_source(
     source: str | Sequence[str], fps: float | None = None, most_pixels: int = MOST_PIXELS
 ) -> FrameSource:
-    """Open what one text or several texts name, see ``name_sources``: pictures one after another, or one other source.
+    """Open the source that one text or several texts name, see ``name_sources``: consecutive pictures, or one other
+    source.
 
     Args:
         source: the texts.
-        fps: frames per second of pictures (default 30), or in place of a video's own rate.
+        fps: frames per second of pictures (default 30), or instead of a video's own rate.
         most_pixels: limit of width x height of an image or of a frame.
 
     Raises:
@@ -95,10 +96,10 @@ def open_named(source: NamedSource, fps: float | None = None, most_pixels: int =
     """
     match source.kind:
         case SourceKind.STREAM:
-            hint = "is the address right, and is it switched on?"
+            hint = "check the address, and that the camera is switched on"
             return LiveSource(source.address, f"stream {source.name}", hint, most_pixels)
         case SourceKind.CAMERA:
-            hint = "is it connected, and free of other programs?"
+            hint = "check that it is connected and that no other program uses it"
             return LiveSource(int(source.address), source.name, hint, most_pixels)
         case SourceKind.FILE if not is_image_file(source.paths[0]):
             return VideoSource(source.paths[0], fps, most_pixels)
@@ -106,7 +107,7 @@ def open_named(source: NamedSource, fps: float | None = None, most_pixels: int =
 
 
 def open_sources(text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS) -> FrameSource:
-    """Open a source, or of a list with commas one source for each view; see ``open_source``.
+    """Open a source, or for a list with commas one source for each view; see ``open_source``.
 
     Raises:
         SourceError: a source cannot be opened.
@@ -194,9 +195,7 @@ class VideoSource:
             )
         self._capture = _open_capture(str(path))
         if not self._capture.isOpened():
-            raise SourceError(
-                f"{path}: is not a video that can be read, or its end with the index is missing"
-            )
+            raise SourceError(f"{path} is not a video that can be read, or its end with the index is missing")
         import cv2
 
         self.name, self.ended_early = str(path), ""
@@ -239,7 +238,8 @@ class VideoSource:
 class _LiveClock:
     """Times of a live source's frames, s from the first one: the camera's time stamps, or times of arrival.
 
-    A stamp counts where it is later than the frame before, and not long before the arrival; some drivers give none.
+    A stamp is used where it is later than the previous frame, and not long before the arrival; some drivers give no
+    stamps.
     """
 
     def __init__(self) -> None:
@@ -263,12 +263,12 @@ class _LiveClock:
 class LiveSource:
     """A camera by its number, or a stream by its address; time stamps are the camera's, from the first frame.
 
-    Where the camera gives none, they are times of arrival.
+    Where the camera gives no stamps, they are times of arrival.
 
     Args:
         source: number or address.
         name: name for messages.
-        hint: question on the likely reason for a failure.
+        hint: the remedy for a failure.
         most_pixels: limit of width x height of a frame.
     """
 
@@ -313,7 +313,7 @@ def _require_frame_size(capture: Any, name: str, most_pixels: int) -> None:
     width, height = (int(capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
     if width * height > most_pixels:
         raise SourceError(
-            f"{name}: its frames have {width} x {height} px; the limit is {most_pixels / 1e6:.4g} megapixels "
+            f"{name}: the frames have {width} x {height} px; the limit is {most_pixels / 1e6:.4g} megapixels "
             "(--max-pixels)"
         )
 
@@ -325,7 +325,7 @@ def _open_capture(source: str | int) -> Any:
 
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    # OpenCV's own reader of AVI files prints letters of the file; it is not tried where there is FFmpeg.
+    # OpenCV's own reader of AVI files prints letters of the file; it is not used where FFmpeg is available.
     has_ffmpeg = isinstance(source, str) and cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
     try:
         if isinstance(source, str) and is_stream_address(source):

@@ -36,7 +36,7 @@ class TrackTable:
 
 
 def table_long_form(columns: Columns, fixed: Columns) -> Columns:
-    """The long form of the columns of frames; ``fixed``: the shared columns, whose ``format`` tells the table."""
+    """The long form of the columns of frames; ``fixed``: the shared columns, whose ``format`` determines the table."""
     if str(fixed["format"]) == "cmp-reconstruction":
         from cmpdesign.tracking.shape_table import shape_long_form as of_shapes
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks import accuracy, extraction
+from benchmarks.ablation import report as ablation
+from benchmarks.acceptance import report as acceptance
 from benchmarks.camera import page as camera
 from benchmarks.datasets import run as datasets
 from benchmarks.suites.comparison.measure import MethodResult
@@ -42,7 +44,7 @@ def _compared() -> list[MethodResult]:
 
 def figures() -> dict[str, bytes]:
     """Name in docs/images -> PNG."""
-    return {"speed-error.png": comparison_picture(_compared())}
+    return {"speed-error.png": comparison_picture(_compared())} | acceptance.figures()
 
 
 def pages() -> dict[Path, str]:
@@ -63,6 +65,8 @@ def pages() -> dict[Path, str]:
         | extraction.markdown(read_measured("extraction"))
         | datasets.markdown(read_measured("datasets"))
         | camera.documentation_blocks(read_measured("camera"))
+        | ablation.documentation_blocks(read_measured(ablation.NAME))
+        | acceptance.documentation_blocks(read_measured(acceptance.NAME))
     )
 
 

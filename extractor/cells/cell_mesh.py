@@ -2,9 +2,9 @@
 
 The centers of the colored cells form a lattice as regular as the pattern's own, and blur that rounds the corners moves
 no center. Every marker is a triangle of a red, a green and a blue center, and so is every black cell; the two kinds
-turn in opposite directions. Cells of one ink are second neighbours in that lattice: an edge of the mesh between two of
-them is the wrong diagonal and is flipped. So colors determine the right neighbours even where shear has made wrong ones
-nearer.
+turn in opposite directions. Cells of one ink are second neighbours in this lattice: an edge of the mesh between two of
+these cells is the wrong diagonal and is flipped. Colors thus determine the right neighbours even where shear has made
+wrong neighbours nearer.
 """
 
 from __future__ import annotations
@@ -24,13 +24,15 @@ class CellMeshLimits(NamedTuple):
     """Limits of the mesh.
 
     Attributes:
-        max_flip_rounds: passes over all faces in which edges between cells of one ink are flipped.
+        max_flip_rounds: passes over all faces in which edges between cells of one ink are flipped. Measured: rule
+            "flips".
         min_area_ratio, max_area_ratio: of a face, relative to its cells' mean area; other triangles are no faces. The
-            ratio is about 1 for three neighbours, and at least 2 across a gap.
+            ratio is about 1 for three neighbours, and at least 2 across a gap. Chosen around the one, and below the
+            other.
         max_swelling: sides of the cells over those at which neighbours just meet. Ink that bled and overexposure make
-            cells larger; smaller ones are left as they are: in clutter, figures that lie apart must not meet.
+            cells larger; smaller ones are left as they are: in clutter, figures that lie apart must not meet. Chosen.
         max_corner_gap: L of eq. 5 (neighbouring cells share a corner), in edges of an equilateral cell of the smaller
-            area; cells whose nearest corners are farther apart form no face.
+            area; cells whose nearest corners are farther apart form no face. Measured: rule "shared corner".
     """
 
     max_flip_rounds: int = 12
@@ -51,7 +53,7 @@ class CellMesh:
         faces: (F, 3) int32, the red, green and blue cell of each face; -1 thrice for a triangle that is no face.
         neighbours: (F, 3) int32, the face across the edge opposite to each cell, or -1.
         orientation: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 no face.
-        swelling: sides of the cells' triangles over those at which neighbours just meet, 1 to
+        swelling: sides of the cells' triangles over the sides at which neighbours just meet, 1 to
             ``CellMeshLimits.max_swelling``.
     """
 

@@ -18,16 +18,17 @@ class CellLimits(NamedTuple):
     """Limits of the cells' areas.
 
     Attributes:
-        nearest_cells: cells with which an area is compared.
-        min_area_share: of the neighbours' median area; smaller domains are dirt.
+        nearest_cells: cells with which an area is compared. Chosen.
+        min_area_share: of the neighbours' median area; smaller domains are dirt. Measured: rule "larger neighbours".
         max_larger_than_cell: number of nearest cells that make a domain dirt if so much larger: half of
-            ``nearest_cells``, for the median.
-        min_intact_share: of the neighbours' upper quartile; smaller cells are cut, their centers shifted.
+            ``nearest_cells``, for the median. Derived.
+        min_intact_share: of the neighbours' upper quartile; smaller cells are cut, their centers shifted. Measured:
+            rule "intact cells".
         max_larger_than_intact: number of nearest cells that make a cell a cut one if so much larger: a quarter of
-            ``nearest_cells`` and one more, for the upper quartile.
-        min_triangle_share: share of triangles among the cells from which on every other cell is a fragment.
+            ``nearest_cells`` and one more, for the upper quartile. Derived.
+        min_triangle_share: share of triangles among the cells from which on every other cell is a fragment. Chosen.
         count_radii: within which cells are counted, in sides of a bucket; they save time and decide nothing. The five
-            by five buckets around a point hold all cells within 2; a disc of 1.1 holds about ``nearest_cells``.
+            by five buckets around a point hold all cells within 2; a disc of 1.1 holds about ``nearest_cells``. Chosen.
     """
 
     nearest_cells: int = 8
@@ -43,7 +44,7 @@ LIMITS = CellLimits()
 
 
 class CellArrays(NamedTuple):
-    """The image's colored cells as native loops take them.
+    """The image's colored cells for native loops.
 
     Attributes:
         center_px, ink, area_px, corner_px: as in ``Cells``.
@@ -90,7 +91,7 @@ class Cells:
 
 
 def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
-    """The domains that are large enough for cells, at full scale; in a cluttered image only the triangles.
+    """The domains that are large enough for cells, at full scale; in a cluttered image triangles only.
 
     Args:
         seeds: the domains, at 1/``scale`` of the image's scale.

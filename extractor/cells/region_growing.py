@@ -18,6 +18,7 @@ class GrowLimits(NamedTuple):
 
     Attributes:
         threshold: of eq. 3 over OpenCV's 8-bit HSV, below which a pixel belongs to the region; as in the article.
+            Published: the article, below eq. 3.
     """
 
     threshold: float = 0.15
@@ -31,7 +32,7 @@ class Regions:
     """Stage 4.
 
     Attributes:
-        region_map: (H, W) int32, the region of each pixel, counted from 1; 0 for none.
+        region_map: (H, W) int32, the region of each pixel, counted from 1; 0 without a region.
         ink: (N,) uint8, 1 red, 2 green, 3 blue.
         seed: (N, 2) int32, x and y of the pixel about which the moments are taken.
         moments: (N, 10) float64, sums of 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy over the region's pixels.

@@ -13,18 +13,18 @@ from extractor._native import cells as native
 from extractor.image.ink_segmentation import Segmentation
 
 NO_DOMAIN_LIMIT = 1 << 62
-SAFE_AREA_PX = 20  # px^2, a cell with edges of 7 px
-MAX_SMALL_SHARE = 1 / 6  # of domains below SAFE_AREA_PX
+SAFE_AREA_PX = 20  # px^2, a cell with edges of 7 px; derived: 0.43 times 7 squared
+MAX_SMALL_SHARE = 1 / 6  # of domains below SAFE_AREA_PX; chosen
 
 
 class DomainLimits(NamedTuple):
     """Limits of the domains.
 
     Attributes:
-        min_domain_px: px^2; smaller domains are ignored.
-        min_cluttered_px: px^2, of a domain in a cluttered image: a cell with edges of 5 px.
+        min_domain_px: px^2; smaller domains are ignored. Chosen.
+        min_cluttered_px: px^2, of a domain in a cluttered image: a cell with edges of 5 px. Derived.
         min_solidity: area of a domain in a cluttered image, relative to the root of the determinant of its pixels'
-            covariance: a triangle has 10.4, an ellipse 12.6, ragged shapes have less.
+            covariance: a triangle has 10.4, an ellipse 12.6, ragged shapes have less. Measured: rule "clutter".
     """
 
     min_domain_px: int = 4
@@ -57,7 +57,7 @@ class Seeds:
         area_px: (N,) int64, the domain's area, px^2.
         runs: (R, 4) int32, the domains' horizontal runs: y, first x, last x, ink.
         domain: (R,) int32, the domain of each run.
-        cluttered: there were more domains than any pattern explains; only those that may be cells are kept.
+        cluttered: there were more domains than in any pattern; only domains that may be cells are kept.
     """
 
     area_px: NDArray[np.int64]
@@ -93,8 +93,8 @@ def find_seeds(segmentation: Segmentation, max_domains: int = NO_DOMAIN_LIMIT) -
 
     Args:
         segmentation: the ink of every pixel.
-        max_domains: of more domains than this, small and ragged ones are ignored, too: an image of noise has many times
-            more domains than any pattern.
+        max_domains: above this number of domains, small and ragged domains are ignored, too: an image of noise has many
+            times more domains than any pattern.
     """
     runs, parent = native.find_runs(segmentation.label)
     runs, domain, area_px, cluttered = native.find_domains(runs, parent, max_domains, LIMITS)

@@ -20,24 +20,26 @@ class TriangleEdgeLimits(NamedTuple):
     """Limits of the measurement of edges.
 
     Attributes:
-        first_profile: of an edge, from its start to the first profile, and from the second one to its end.
-        half_profile: samples on each side of an edge.
-        border_margin_px: from profiles to the last row and column; more than half a sub-pixel step.
+        first_profile: of an edge, from its start to the first profile, and from the second one to its end. Chosen.
+        half_profile: samples on each side of an edge. Chosen.
+        border_margin_px: from profiles to the last row and column; more than half a sub-pixel step. Derived.
         profile_reach: half length of a profile in the first pass, in vectors from the cell's center to the edge's
-            middle.
-        fine_reach_px: half length of a profile, about; longer profiles are followed by shorter ones.
-        next_reach: half length of a profile, relative to the pass before.
-        max_passes: the first one and those with shorter profiles.
+            middle. Chosen.
+        fine_reach_px: half length of a profile, about; longer profiles are followed by shorter ones. Measured: rule
+            "shorter profiles".
+        next_reach: half length of a profile, relative to the pass before. Measured: rule "shorter profiles".
+        max_passes: the first one and those with shorter profiles. Measured: rule "shorter profiles".
         ink_radius: of the disc in which the ink's color is measured, relative to the corner's distance from the center.
+            Chosen.
         background_place: of the disc of the color outside an edge, in vectors from the cell's center to the edge's
-            middle.
-        background_radius: of this disc, relative to the edge's distance from the center.
-        min_depth_px: distance of a valid edge from the cell's center.
-        min_contrast: norm over the three 8-bit channels, between the ink and the color outside a valid edge.
-        min_sine: two edges that meet at less than 3 degrees have no corner.
-        max_corner_shift: of a valid triangle, in units of the corner's distance from the center.
-        min_profile_level, max_profile_level: to which a profile's share of ink is limited.
-        smallest_contrast: of a squared contrast, to divide by.
+            middle. Derived: the middle of a neighbour as large.
+        background_radius: of this disc, relative to the edge's distance from the center. Chosen.
+        min_depth_px: distance of a valid edge from the cell's center. Chosen.
+        min_contrast: norm over the three 8-bit channels, between the ink and the color outside a valid edge. Chosen.
+        min_sine: two edges that meet at less than 3 degrees have no corner. Chosen.
+        max_corner_shift: of a valid triangle, in units of the corner's distance from the center. Chosen.
+        min_profile_level, max_profile_level: to which a profile's share of ink is limited. Chosen.
+        smallest_contrast: of a squared contrast, to divide by. Derived: it only keeps a division from failing.
     """
 
     first_profile: float = 0.25
@@ -67,7 +69,7 @@ def update_triangle_corners(
 ) -> None:
     """Move the corners of triangles to the intersections of their measured edges.
 
-    The first profiles reach across the cell; for large cells shorter ones follow.
+    The first profiles reach across the cell; for large cells shorter profiles follow.
 
     Args:
         view: the image.

@@ -20,9 +20,10 @@ class MomentLimits(NamedTuple):
     """Limits of regions whose moments are those of triangles.
 
     Attributes:
-        min_area_px: px^2.
-        min_triangularity: |E[z^3]| relative to a triangle's; a disc, an ellipse and a square have 0.
-        max_elongation: (trace of the covariance)^2 / determinant; 4 is equilateral.
+        min_area_px: px^2. Chosen.
+        min_triangularity: |E[z^3]| relative to a triangle's; a disc, an ellipse and a square have 0. Chosen between
+            both.
+        max_elongation: (trace of the covariance)^2 / determinant; 4 is equilateral. Chosen.
     """
 
     min_area_px: float = 4.0

@@ -1,6 +1,6 @@
 """Stage 8, first half: markers that contradict their neighbours are dropped.
 
-A marker must lie where the map of its two rings puts it.
+A marker must lie at the place that follows from the map of its two rings.
 """
 
 from __future__ import annotations
@@ -22,11 +22,16 @@ class ConsistencyLimits(NamedTuple):
     """Limits of markers that do not contradict their neighbours. Distances and deviations are in edges.
 
     Attributes:
-        max_rounds: of rejection; each round drops the worst marker of every neighbourhood.
-        max_distance: between a marker and its prediction by two rings.
-        max_agreed_unexplained_distance: the same where two triangles agree and synthesis explains nothing.
-        max_predicted_deviation: of the prediction of a marker that only two triangles confirm.
-        max_unexplained_distance: of a marker that is obstructed, and the deviation of its prediction.
+        max_rounds: of rejection; each round drops the worst marker of every neighbourhood. Measured: rule "ring
+            outliers".
+        max_distance: between a marker and its prediction by two rings. Measured:
+            `python -m benchmarks.acceptance`.
+        max_agreed_unexplained_distance: the same where two triangles agree and synthesis explains nothing. Measured:
+            rule "agreed unexplained".
+        max_predicted_deviation: of the prediction of a marker that only two triangles confirm. Measured: rule
+            "confirmed".
+        max_unexplained_distance: of a marker that is obstructed, and the deviation of its prediction. Measured: rule
+            "unexplained".
         maps: limits of the predictions.
     """
 
@@ -57,7 +62,7 @@ class ConsistentMarkers(NamedTuple):
 
 
 class MarkerEvidence(NamedTuple):
-    """Results of earlier stages by which markers are judged, for each of M markers.
+    """Results of earlier stages for the tests of markers, for each of M markers.
 
     Attributes:
         explained: (M,) bool, synthesis explains the image around the marker.

@@ -1,4 +1,4 @@
-"""The quality of an image, measured at the middles of cells: what limits the reading of its markers."""
+"""The quality of an image, measured at the middles of cells: the properties that limit the reading."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.quality import UNKNOWN, Quality
 from extractor.refine.measure.gridline_weights import median_edge
 
-CELLS_PER_INK = 40  # that are sampled
-SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged
-CLIPPING_STRIDE = 4  # of the pixels by which the clipping of an image without numbers is measured
+CELLS_PER_INK = 40  # that are sampled; chosen
+SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged; chosen
+# of the pixels by which the clipping of an image without numbers is measured; chosen, for time
+CLIPPING_STRIDE = 4
 
 
 class QualityLimits(NamedTuple):
     """Limits of the quality.
 
     Attributes:
-        clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255.
-        dim_quantile: of the cells' light, that is the dimmest; the brightest are as many.
+        clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255. Chosen.
+        dim_quantile: of the cells' light, that is the dimmest; the brightest are as many. Chosen.
     """
 
     clipped_value: float = 253.0
@@ -86,8 +87,14 @@ def measure_quality(
     return _quality(found, blur_px, estimate_noise(view.image, xy_px, cells.corners), edge_px)
 
 
-def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None) -> Quality:
-    """The quality of an image in which no cell was numbered; ``cells`` are those that were found, if any."""
+def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None, has_pattern: bool) -> Quality:
+    """The quality of an image in which no cell was numbered.
+
+    Args:
+        view: the image at full scale.
+        cells: the found cells, if any.
+        has_pattern: whether cells are neighbours as in a pattern; the area of other cells gives no edge.
+    """
     clipping = float(
         (view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE].max(axis=2) >= LIMITS.clipped_value).mean()
     )
@@ -96,7 +103,8 @@ def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None) -> 
     color = (cells.ink - 1).astype(np.uint8)
     chosen = _spread(color)
     found = _quality_at(view, np.ascontiguousarray(cells.center_px[chosen]), color[chosen], cells.edge_px)
-    return replace(_quality(found, np.nan, np.nan, cells.edge_px), clipping=clipping)
+    edge_px = cells.edge_px if has_pattern else np.nan
+    return replace(_quality(found, np.nan, np.nan, edge_px), clipping=clipping)
 
 
 def _quality_at(

@@ -14,7 +14,8 @@ class LayerLimits(NamedTuple):
     """Limits of the quadratics through layers.
 
     Attributes:
-        min_markers: known markers of a layer within a sextant, for a quadratic with a residual.
+        min_markers: known markers of a layer within a sextant, for a quadratic with a residual. Derived: three
+            coefficients, and two equations over.
     """
 
     min_markers: int = 5
@@ -32,8 +33,8 @@ def predict_by_layer(xy: NDArray[np.float64], layers: int) -> tuple[NDArray[np.f
 
     Returns:
         (M, 2) px, NaN where there are too few markers; and (M,) the variance of these places, px^2 per axis, from the
-        residual of the fit, infinite without a place. For a corner of the layer, which two sextants share, the place
-        with the smaller variance is taken.
+        residual of the fit, infinite without a place. For a corner of the layer, which belongs to two sextants, the
+        place with the smaller variance is taken.
     """
     predicted, variance = native.predict_by_layer(np.ascontiguousarray(xy), layers, LIMITS)
     return np.asarray(predicted), np.asarray(variance)

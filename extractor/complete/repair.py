@@ -1,10 +1,12 @@
-"""Stage 8: markers that contradict their neighbours are dropped, and lost ones repaired where that is safe.
+"""Stage 8: markers that contradict their neighbours are dropped, and lost markers are repaired where their neighbours
+leave no doubt.
 
-Mild omission (the article's eq. 6): the triangles around a lost marker imply its place; here all markers of two rings
-do, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
-sextant, read at equidistant places. A marker that neither predicts within a tenth of an edge stays lost.
+Mild omission (the article's eq. 6): the triangles around a lost marker give its place; here all markers of two rings
+give it, through one local quadratic map. Heavy omission (Fig. 8): a quadratic through the markers of the same layer and
+sextant, read at equidistant places. A marker that neither method predicts within a tenth of an edge stays lost.
 
-An uncertain marker, as under dirt, may be predicted by its rings better than it is measured: both are fused.
+The prediction by the rings of an uncertain marker, as under dirt, may be better than its measurement: both are
+    combined.
 """
 
 from __future__ import annotations
@@ -38,28 +40,27 @@ class RepairLimits(NamedTuple):
     missing cells and dirt on flat, tilted, pressed and twisted patterns: deviation = ``mild_error`` * leverage *
     residual, as the surface departs the more from the map the farther this extrapolates. A layer's quadratic rests on
     few markers and may seem to fit better than it does: its variance counts ``heavy_error`` times, and is never below
-    that of the model. Likewise against the residual of a cubic in nearly whole rings, on the surfaces under balls,
-    rings, ribs, wedges and cubes (their true markers, with up to three neighbours removed): 99 % of the errors stay
-    below 1.5 deviations of ``cubic_error`` * residual.
+    that of the model.
 
     Attributes:
-        max_implied_distance: between the place that cells imply and the prediction by markers.
-        implied_deviation: of a place that cells imply.
-        max_implied_sigmas: deviations of this distance, from which on the two places contradict each other.
-        border_width: of the image's border, which cuts cells; cells there imply nothing.
-        mild_support: known neighbours of two rings that make an omission mild.
-        min_rim_support: known neighbours of a lost marker that cells imply.
-        max_repaired_deviation: of a repaired marker: three such deviations stay below a quarter of an edge.
-        max_fitted_deviation: of a fitted marker: a layer's quadratic is wrong where the surface is bent.
-        max_leverage: of the neighbours' errors on a repaired marker.
-        max_rim_leverage: the same on a marker that cells imply.
-        outer_ring_error: possible error of the outer ring where too little of the inner ring can confirm it.
-        model_deviation: deviation of a smooth surface from a quadratic map.
+        max_implied_distance: between the place that cells imply and the prediction by markers. Measured: rule "repair
+            by cells".
+        implied_deviation: of a place that cells imply. Chosen.
+        max_implied_sigmas: deviations of this distance, from which on the two places contradict each other. Chosen.
+        border_width: of the image's border, which cuts cells; cells there imply nothing. Chosen.
+        mild_support: known neighbours of two rings that make an omission mild. Chosen.
+        min_rim_support: known neighbours of a lost marker that cells imply. Chosen.
+        max_repaired_deviation: of a repaired marker: three such deviations stay below a quarter of an edge. Derived.
+        max_fitted_deviation: of a fitted marker: a layer's quadratic is wrong where the surface is bent. Measured: rule
+            "repair by layer".
+        max_leverage: of the neighbours' errors on a repaired marker. Measured: rule "repair by rings".
+        max_rim_leverage: the same on a marker that cells imply. Chosen.
+        model_deviation: deviation of a smooth surface from a quadratic map. Chosen.
         fitted_model_sigmas: such deviations that are added to a layer's residual before it is compared with
-            ``max_fitted_deviation``.
-        mild_error: measured as described above, no unit.
-        heavy_error: likewise.
-        cubic_error: likewise.
+            ``max_fitted_deviation``. Chosen.
+        mild_error: times leverage and residual. Measured as described above, by no command that is kept;
+            `python -m benchmarks.calibration` prints z of repaired markers.
+        heavy_error: the same of a layer's quadratic, as a factor of the variance. Measured likewise.
         layers: limits of a layer's quadratic.
         maps: limits of the predictions by neighbours.
     """
@@ -74,12 +75,10 @@ class RepairLimits(NamedTuple):
     max_fitted_deviation: float = 0.05
     max_leverage: float = 1.2
     max_rim_leverage: float = 2.0
-    outer_ring_error: float = 0.04
     model_deviation: float = 0.012
     fitted_model_sigmas: float = 3.0
     mild_error: float = 1.6
     heavy_error: float = 2.0
-    cubic_error: float = 1.6
     layers: LayerLimits = LAYER_LIMITS
     maps: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS
 
@@ -88,7 +87,7 @@ LIMITS = RepairLimits()
 
 
 class UnrepairedMarkers(NamedTuple):
-    """What is known of M markers before repair.
+    """M markers before repair.
 
     Attributes:
         xy_px, cov_px2: (M, 2) and (M, 2, 2) float64, NaN where lost; they are written.
@@ -121,7 +120,8 @@ class RepairedMarkers:
 def repair_markers(
     refined: RefinedMarkers, places: InitialMarkers, lattice: Lattice, size: tuple[int, int]
 ) -> RepairedMarkers:
-    """Drop inconsistent markers, repair lost ones that the others predict, and fuse uncertain ones with predictions.
+    """Drop inconsistent markers, repair lost markers that the others predict, and combine uncertain markers with
+    predictions.
 
     Args:
         refined: the markers after refinement.

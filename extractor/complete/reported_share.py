@@ -1,11 +1,11 @@
-"""Whether few of the visible markers are reported: there is a reason for it then."""
+"""Whether few of the visible markers are reported: the result then has a reason."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-MIN_FIT_MARKERS = 3  # for a map from layout to image
+MIN_FIT_MARKERS = 3  # for a map from layout to image; derived: three coefficients an axis
 
 
 def is_less_than_half_reported(
@@ -16,8 +16,8 @@ def is_less_than_half_reported(
 ) -> bool:
     """Whether fewer than half of the markers that lie within the image are reported.
 
-    An affine map through the reported markers tells which of the others lie within the image; with fewer than three
-    markers, all do.
+    An affine map through the reported markers gives the other markers that lie within the image; with fewer than three
+    markers, all count.
 
     Args:
         xy_px: (M, 2) the reported markers, NaN where lost.

@@ -1,4 +1,4 @@
-"""Uncertain markers, as under dirt: the measurement is fused with the prediction by other markers."""
+"""Uncertain markers, as under dirt: the measurement is combined with the prediction by other markers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class UncertainLimits(NamedTuple):
     """Limits of uncertain markers.
 
     Attributes:
-        deviation: in edges, of a marker that others may predict better: at best to 0.012.
+        deviation: in edges, of a marker that others may predict better: at best to 0.012. Measured: rule "fusion".
     """
 
     deviation: float = 0.02

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
-from extractor.refine.measure.marker_scatter import BEND_BY_SCATTER, MarkerScatter
+from extractor.refine.measure.marker_scatter import MarkerScatter
 from extractor.refine.synthesis.gridlines import local_maps
 from extractor.result import Status
 
@@ -24,14 +24,12 @@ class VirtualLimits(NamedTuple):
     """Limits of virtual markers.
 
     Attributes:
-        max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt.
-        bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord.
-        bend_by_scatter: as in ``BendingLimits``.
+        max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt. Chosen.
+        bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord. Chosen.
     """
 
     max_measured_offset: float = 0.08
     bend_uncertainty: float = 0.05
-    bend_by_scatter: float = BEND_BY_SCATTER
 
 
 LIMITS = VirtualLimits()
@@ -77,7 +75,7 @@ def locate_virtual_markers(
 
     Args:
         points: (E, m, 3) float64, measured x and y (px) and their variance across the gridline (px^2), NaN for none.
-        scatter: of the markers; with some, the gridlines curve as the map's second derivatives say.
+        scatter: of the markers; with scatter, the gridlines curve by the map's second derivatives.
     """
     if points.shape[1] == 0:
         return VirtualMarkers(

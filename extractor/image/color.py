@@ -16,14 +16,15 @@ class HueLimits(NamedTuple):
     """Limits of the search for the inks' hues.
 
     Attributes:
-        reach_deg: degrees, the maximum shift of an ink's hue from its nominal hue; 60 would be ambiguous.
-        width_deg: degrees; pixels farther from every center do not count.
-        rounds: of the 3-means.
-        min_chroma: gray levels; below it, 8-bit hue is noise.
-        strong_quantile: share of the colored pixels with less chroma than a strong one.
-        pale_divisor: a pale pixel has less than this fraction (1/8) of the strong chroma.
+        reach_deg: degrees, the maximum shift of an ink's hue from its nominal hue; 60 would be ambiguous. Chosen below
+            that.
+        width_deg: degrees; pixels farther from every center do not count. Chosen.
+        rounds: of the 3-means. Chosen.
+        min_chroma: gray levels; below it, 8-bit hue is noise. Chosen.
+        strong_quantile: share of the colored pixels with less chroma than a strong one. Measured: rule "pale pixels".
+        pale_divisor: a pale pixel has less than this fraction (1/8) of the strong chroma. Measured: rule "pale pixels".
         ink_width_deg: degrees; hues as far from every ink belong to none. It is half of the distance of the nominal
-            hues.
+            hues. Derived.
     """
 
     reach_deg: float = 50.0

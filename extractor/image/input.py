@@ -20,7 +20,7 @@ class NoiseLimits(NamedTuple):
     """Limits of the estimate of the noise.
 
     Attributes:
-        samples: pixels for the estimate; with fewer cells, several pixels in each.
+        samples: pixels for the estimate; with fewer cells, several pixels in each. Chosen.
     """
 
     samples: int = 600
@@ -65,7 +65,7 @@ def convert_to_bgr(image: NDArray[Any], channels: Channels = "bgr") -> NDArray[n
 
 
 def in_native_order(image: NDArray[Any]) -> NDArray[Any]:
-    """The image in the byte order of this machine: OpenCV reads the bytes of another order as they lie."""
+    """The image in the byte order of this machine: OpenCV does not convert the byte order."""
     return image if image.dtype.isnative else image.astype(image.dtype.newbyteorder("="))
 
 

@@ -1,6 +1,6 @@
 """The response of a camera: the light behind each 8-bit value, and the values of light.
 
-Lenses blur light, and cameras encode the blurred light afterwards (sRGB, IEC 61966-2-1, or alike). A response is a
+Lenses blur light, and cameras encode the blurred light afterwards (sRGB, IEC 61966-2-1, or similar). A response is a
 table of the light of the 256 values; light is in units of 1/255 of the light of the value 255. Between two values a
 response is a straight line, which differs from the sRGB curve by less than 0.002 units.
 """
@@ -26,7 +26,7 @@ Response = Literal["srgb", "linear"] | float | Sequence[float] | NDArray[np.floa
 
 
 class ResponseTables(NamedTuple):
-    """A response as compiled functions take it.
+    """A response for compiled functions.
 
     Attributes:
         light: (256,) float32, the light of each value.
@@ -102,7 +102,8 @@ def decode_values(values: NDArray[Any], light_of_value: NDArray[np.float64]) -> 
 def encode_light(light: NDArray[Any], light_of_value: NDArray[np.float64]) -> NDArray[np.float64]:
     """The values, not rounded, of any array of light; ``light_of_value`` (256,) is the response.
 
-    More light than that of 255 has values above 255, as the response's last step goes on: sensors clip after the noise.
+    More light than that of 255 has values above 255, because the response's last step continues: sensors clip after the
+    noise.
     """
     values = np.interp(light, light_of_value, np.arange(VALUES, dtype=np.float64))
     return np.asarray(

@@ -19,9 +19,9 @@ class TargetLimits(NamedTuple):
     """Limits of the target area.
 
     Attributes:
-        strong_quantile: rank of the tile chroma that counts as strong.
-        strong_share: of the strong chroma; tiles with less have no color.
-        min_chroma: gray levels; tiles with less have no color either, as in ``HueLimits``.
+        strong_quantile: rank of the tile chroma that counts as strong. Chosen.
+        strong_share: of the strong chroma; tiles with less have no color. Chosen.
+        min_chroma: gray levels; tiles with less have no color either, as in ``HueLimits``. Derived.
     """
 
     strong_quantile: float = 0.95

@@ -1,4 +1,4 @@
-"""The optional field ``as_made`` of a layout file: how a made pad differs from its design."""
+"""The optional field ``as_made`` of a layout file: the differences of a made pad from its design."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COLUMNS = ("xx", "xy", "yy")  # of a covariance
 
 
 def read_as_made(document: dict[str, Any], colored: int, markers: int) -> AsMade | None:
-    """How the pad was made; None for a pad as designed.
+    """The made pad; None for a pad as designed.
 
     Args:
         document: the layout file.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from extractor.errors import LayoutError
 
-MAX_MM = 1e6  # one kilometre: larger than any sensor, and squares of lengths still keep their digits
+MAX_MM = 1e6  # one kilometre: larger than any sensor; squares of lengths still have enough digits
 MAX_INT = 2**31 - 1
 # Of a document; a layout of 200 layers has 0.6 million lists and 2.7 million commas.
 MAX_BRACKETS, MAX_COMMAS = 1 << 20, 1 << 22
@@ -85,7 +85,7 @@ def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def known_fields(
     container: dict[str, Any], names: Sequence[str], prefix: str = "", optional: Sequence[str] = ()
 ) -> None:
-    """Check that an object has all fields of these names and, but for the optional ones, no other field."""
+    """Check that an object has all fields of these names and, except for the optional fields, no other field."""
     for name in names:
         if name not in container:
             fail(prefix + name, "missing", f"one of the fields {', '.join(names)}")
@@ -103,7 +103,7 @@ def _known(names: Sequence[str], optional: Sequence[str]) -> str:
 
 
 def nearest_name(word: str, known: Sequence[str]) -> str:
-    """The part of a message that names the nearest known name; empty if none is near."""
+    """The part of a message that states the nearest known name; empty if no known name is near."""
     found = difflib.get_close_matches(word[:60], known, n=1, cutoff=0.6)
     return f" (did you mean {found[0]}?)" if found else ""
 

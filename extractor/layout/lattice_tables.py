@@ -20,11 +20,11 @@ from extractor.layout.reference import BLACK, WHITE, Reference
 
 UNKNOWN_AXIAL = -(
     1 << 20
-)  # the axial coordinate of a cell that has none; as in native/layout/lattice_tables.hpp
+)  # the axial coordinate of a cell without coordinates; as in native/layout/lattice_tables.hpp
 
 
 class LayoutCells(NamedTuple):
-    """The layout's U colored cells, in the form that compiled functions take.
+    """The layout's U colored cells, for compiled functions.
 
     Attributes:
         center_mm: (U, 2) float64, layout frame.
@@ -43,7 +43,7 @@ class LayoutCells(NamedTuple):
 
 
 class RingTables(NamedTuple):
-    """The neighbours of the layout's M markers, in the form that compiled functions take; -1 for no neighbour.
+    """The neighbours of the layout's M markers, for compiled functions; -1 for no neighbour.
 
     Attributes:
         marker_mm: (M, 2) float64, layout frame.
@@ -142,11 +142,6 @@ class Lattice:
     def first_ring(self) -> NDArray[np.int32]:
         """(M, 6) int32, the six markers around each marker, -1 outside the pattern."""
         return np.ascontiguousarray(self.neighbours[:, FIRST_RING])
-
-    @cached_property
-    def is_rim(self) -> NDArray[np.bool_]:
-        """(M,) bool, the markers that have fewer than six present neighbours."""
-        return np.asarray(~((self.first_ring >= 0) & self.present[self.first_ring]).all(axis=1))
 
     @cached_property
     def corner_vectors_mm(self) -> NDArray[np.float64]:

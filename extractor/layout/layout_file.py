@@ -26,7 +26,7 @@ from extractor.layout.text_file import printable_path, read_text_file
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
 MAX_BYTES = 1 << 26  # of a layout file; 200 layers take 23 MiB
 MAX_VIRTUAL_PER_EDGE = 1000
-MAX_VIRTUAL_MARKERS = 4_000_000  # of a layout; a result holds 49 bytes for each
+MAX_VIRTUAL_MARKERS = 4_000_000  # of a layout; a result holds 49 bytes for each virtual marker
 FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
     "reference", "palette", "border_mm", "outline", "generator", "digest",
@@ -40,7 +40,7 @@ class HasReference(Protocol):
     def reference(self) -> Reference: ...
 
 
-# What describes a layout: its file, the value of its file, the file's JSON object, or a value that gives one.
+# Forms of a layout: its file, the value of its file, the file's JSON object, or a value that gives a ``Reference``.
 LayoutLike = str | PathLike[str] | Reference | Mapping[str, Any] | HasReference
 
 
@@ -74,7 +74,7 @@ def _json_text(document: Mapping[str, Any]) -> str:
     try:
         return json.dumps(dict(document))
     except (TypeError, ValueError, RecursionError) as error:
-        raise LayoutError(f"layout: is no JSON object ({error}); expected that of a layout.json") from None
+        raise LayoutError(f"layout is no JSON object ({error}); expected that of a layout.json") from None
 
 
 def load_layout(path: str | PathLike[str]) -> Reference:

@@ -22,15 +22,15 @@ class NeighbourMapLimits(NamedTuple):
 
     Attributes:
         min_pivot: of a Cholesky factor of the normal equations; below it the neighbours do not determine the map.
-        min_linear_neighbours: markers; fewer give no map.
-        min_quadratic_neighbours: markers; fewer give the linear map.
-        min_cubic_neighbours: markers; with fewer a cubic map has too few degrees of freedom.
+            Chosen.
+        min_linear_neighbours: markers; fewer give no map. Derived: three coefficients, and one equation over.
+        min_quadratic_neighbours: markers; fewer give the linear map. Derived: six coefficients, and three equations
+            over.
     """
 
     min_pivot: float = 1e-7
     min_linear_neighbours: int = 4
     min_quadratic_neighbours: int = 9
-    min_cubic_neighbours: int = 16
 
 
 LIMITS = NeighbourMapLimits()

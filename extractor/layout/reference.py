@@ -23,12 +23,12 @@ ARRAY_FIELDS = (
 
 @dataclass(frozen=True, eq=False)
 class AsMade(FrozenRecord):
-    """How a made pad differs from the layout that it was made after. The layout's markers are where they were made.
+    """The differences of a made pad from its nominal layout. The layout's markers are at the places as made.
 
     Attributes:
         of: digest of the nominal layout.
-        product: what made the pad: "laser", "mold", "print"; "measured" where pictures of the pad tell.
-        side: side of the pattern that was measured, or that the outlines belong to: "front" or "back".
+        product: product that made the pad: "laser", "mold", "print"; "measured" for a layout from pictures of the pad.
+        side: side of the measurement or of the outlines: "front" or "back".
         outlines_mm: one (K, 2) float64 outline for each cell that is not black; None: triangles between the markers.
         covariance_mm2: (M, 2, 2) float64, of the places of the layout's markers, NaN for a marker that was not
             measured and stays at its nominal place; None: unknown.
@@ -66,9 +66,9 @@ class Reference(FrozenRecord):
         border_mm: width of the black border.
         outline_mm: (K, 2) float64, the closed outline of the black ground, counter-clockwise.
         digest: SHA-256 (hex) of the geometry.
-        fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty where there are none.
+        fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty without marks.
         fiducial_diameter_mm: diameter of these marks.
-        as_made: how a made pad differs from its design; None for a pad as designed.
+        as_made: differences of a made pad from its design; None for a pad as designed.
     """
 
     pattern: str
@@ -101,7 +101,7 @@ class Reference(FrozenRecord):
 
     @property
     def mirrored(self) -> bool:
-        """Whether the camera is meant to look at the pattern's back."""
+        """Whether the camera sees the pattern's back, by the design."""
         return bool(self.parameters.get("mirrored", False))
 
     @property

@@ -12,7 +12,7 @@ _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a so
 
 
 def read_text_file(path: str | PathLike[str], most_bytes: int, error: type[ExtractorError]) -> str:
-    """Read a regular file of UTF-8 text. A pipe is not waited for.
+    """Read a regular file of UTF-8 text. The function does not wait for a pipe.
 
     Args:
         path: the file.
@@ -36,7 +36,7 @@ def read_text_file(path: str | PathLike[str], most_bytes: int, error: type[Extra
             found = os.fstat(descriptor)
             mode = found.st_mode
             kind = None if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "a device")
-            # As many bytes as are asked for are allocated.
+            # ``read`` allocates the requested number of bytes.
             data = b"" if kind else file.read(min(found.st_size, most_bytes) + 1)
     except OSError as problem:
         raise error(f"{name}: cannot be read: {problem.strerror}") from None

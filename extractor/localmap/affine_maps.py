@@ -15,9 +15,11 @@ class AffineMapLimits(NamedTuple):
     """Limits of linear maps.
 
     Attributes:
-        min_spread: least ratio of the neighbours' spread across to along; below it they lie on one line.
-        max_misfit: of the distance to a neighbour, from its center to the prediction by a triangle.
-        min_rival_misfit: the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances.
+        min_spread: least ratio of the neighbours' spread across to along; below it they lie on one line. Chosen.
+        max_misfit: of the distance to a neighbour, from its center to the prediction by a triangle. Measured: rule
+            "mapped by triangle".
+        min_rival_misfit: the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances. Chosen
+            below that.
     """
 
     min_spread: float = 0.2
@@ -37,9 +39,9 @@ def completed_linear_maps(
 ) -> NDArray[np.float64]:
     """The linear map around each numbered cell, by least squares over its six neighbours.
 
-    The millimetres of the layout contain the pattern's own shape, so a round pattern is no more curved than a
+    The millimetres of the layout contain the pattern's own shape, so a round pattern has the same maps as a
     honeycomb. Where a cell has too few neighbours, at the rims of holes, its own triangle gives its map if a neighbour
-    shows which of its corners is which.
+    determines the order of its corners.
 
     Args:
         center_px: (N, 2) the cells' centers; corner_px: (N, 3, 2) their triangles, clockwise, or NaN.

@@ -12,14 +12,14 @@ class QuadraticMapLimits(NamedTuple):
     """Limits of the map of a detached cell.
 
     Attributes:
-        max_support_distance: in cells, from the nearest support cell; farther away a place is uncertain.
-        max_deviation: in cells, of the predicted place; beyond it the place is uncertain.
-        robust_rounds: of least squares; support cells cut by dirt are outliers.
-        exact_misfit: in cells; smaller misfits keep the full weight.
+        max_support_distance: in cells, from the nearest support cell; farther away a place is uncertain. Chosen.
+        max_deviation: in cells, of the predicted place; beyond it the place is uncertain. Chosen.
+        robust_rounds: of least squares; support cells cut by dirt are outliers. Chosen.
+        exact_misfit: in cells; smaller misfits keep the full weight. Chosen.
         distance_softening: in squares of the support cells' mean distance; added to the squared distance by which a
-            support cell's weight is divided.
-        ridge: regularises the curvature where the support cells lie in a row.
-        min_pivot: of the normal matrix, against its largest entry; below it the support cells lie in a row.
+            support cell's weight is divided. Chosen.
+        ridge: regularises the curvature where the support cells lie in a row. Chosen.
+        min_pivot: of the normal matrix, against its largest entry; below it the support cells lie in a row. Chosen.
     """
 
     max_support_distance: float = 4.5

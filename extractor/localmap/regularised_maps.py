@@ -1,6 +1,7 @@
 """Quadratic maps through the markers of two rings, with regularised curvature, for many markers at once.
 
-They serve markers whose rings are incomplete: at the pattern's rim and around damage. An unknown neighbour has no
+They are used for markers whose rings are incomplete: at the pattern's rim and around damage. An unknown neighbour has
+    no
 weight.
 """
 
@@ -12,25 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import localmap as native
+from extractor.layout.topology import FIRM_RIDGE, MIN_FIRM_MARKERS
 
 
 class RegularisedMapLimits(NamedTuple):
     """Limits of regularised maps.
 
     Attributes:
-        min_sine2: least squared sine of the angle between the neighbours' directions.
-        min_neighbours: known markers; fewer do not determine the slopes.
-        min_curved_neighbours: known markers; with fewer the map is linear.
-        min_firm_neighbours: known markers; with fewer the curvature is held by ``weak_ridge``.
+        min_sine2: least squared sine of the angle between the neighbours' directions. Chosen.
+        min_neighbours: known markers; fewer do not determine the slopes. Derived: two slopes.
+        min_curved_neighbours: known markers; with fewer the map is linear. Derived: five derivatives.
+        min_firm_neighbours: known markers; with fewer the curvature is held by ``weak_ridge``. Chosen.
         firm_ridge, weak_ridge, linear_ridge: added to the diagonal of the curvature's normal equations with enough
-            neighbours, with some, and with too few; the unit is that of the layout's vectors.
+            neighbours, with some, and with too few; the unit is that of the layout's vectors. Chosen; the last one is
+            so large that nothing curves.
     """
 
     min_sine2: float = 0.05
     min_neighbours: int = 2
     min_curved_neighbours: int = 5
-    min_firm_neighbours: int = 8
-    firm_ridge: float = 0.001
+    min_firm_neighbours: int = MIN_FIRM_MARKERS
+    firm_ridge: float = FIRM_RIDGE
     weak_ridge: float = 0.02
     linear_ridge: float = 1e9
 

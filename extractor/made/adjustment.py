@@ -1,12 +1,12 @@
-"""The adjustment of rest pictures: one homography a picture and one place a marker, most likely together.
+"""The adjustment of rest pictures: one homography per picture and one place per marker, by maximum likelihood.
 
 A reading x of marker m in picture v, with the stated covariance C, is H_v(p_m) plus an error of covariance C. Maximum
 likelihood over all H_v and p_m is a bundle adjustment (Triggs et al., *Bundle adjustment: a modern synthesis*, 2000):
 Gauss-Newton, with the places eliminated from the normal equations by Schur's complement.
 
-The readings fix the places up to one homography common to all of them, eight numbers: position, turn, two scales,
-shear and perspective of the whole pad. It is chosen so that the places lie nearest to the nominal ones, by least
-squares.
+The readings fix the places up to one homography common to all places, eight numbers: position, turn, two scales,
+shear and perspective of the whole pad. This homography is chosen so that the places lie nearest to the nominal places,
+by least squares.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from extractor.numeric.homographies import (
 )
 
 STEPS = 20
-CONVERGED_DEVIATIONS = 1e-4  # largest step of a place, in standard deviations
+CONVERGED_DEVIATIONS = 1e-4  # largest step of a place, in standard deviations; chosen
 
 
 class Readings(NamedTuple):
@@ -50,8 +50,8 @@ class Adjustment:
 
     Attributes:
         xy_mm: (M, 2) float64, NaN where no picture shows the marker.
-        cov_mm2: (M, 2, 2) float64, of the places as far as they are determined; the common homography, which is not,
-            is no part of it. By the stated covariances, times ``z`` squared.
+        cov_mm2: (M, 2, 2) float64, of the places as far as they are determined; the common homography is not determined
+            and is not included. By the stated covariances, times ``z`` squared.
         z: root of chi squared over its degrees of freedom: residuals over stated deviations.
         picture_z: (V,) the same of each picture.
         picture_rms_px: (V,) root mean square of the residuals per axis, corrected for the degrees of freedom.
@@ -115,7 +115,7 @@ def adjust_places(readings: Readings, nominal_mm: Array) -> Adjustment:
     residual = np.where(read[..., None], observed - mapped(homographies, places), 0.0)
     squares = np.einsum("vmi,vmij,vmj->v", residual, weight, residual)
     axes = 2.0 * read.sum(axis=1)
-    # Without redundancy, as with one picture, nothing can be said about the residuals.
+    # Without redundancy, as with one picture, the residuals have no information.
     redundancy = axes.sum() - 2.0 * seen.sum() - PARAMETERS * (len(read) - 1)
     share = redundancy / axes.sum() if redundancy > 0 else np.nan
     z2 = float(squares.sum() / redundancy) if redundancy > 0 else np.nan
@@ -153,7 +153,7 @@ def _linearised(homographies: Array, places: Array, observed: Array, weight: Arr
 
 
 def _solved(linear: _Linear) -> tuple[Array, Array]:
-    """The steps (V, 8) of the homographies and (M, 2) of the places, the shortest along what is not determined."""
+    """The steps (V, 8) of the homographies and (M, 2) of the places, the shortest along undetermined directions."""
     gain = linear.inverse @ linear.cross
     right = linear.right_entries - np.einsum("mia,mi->a", gain, linear.right_places)
     step = _undetermined_inverse(linear, gain) @ right
@@ -174,7 +174,7 @@ def _undetermined_inverse(linear: _Linear, gain: Array) -> Array:
 def _nearest_to(
     nominal: Array, seen: NDArray[np.bool_], homographies: Array, places: Array
 ) -> tuple[Array, Array]:
-    """The same pictures by places that lie nearest to the nominal ones."""
+    """The same pictures with places that lie nearest to the nominal places."""
     common = fitted_homography(places[seen], nominal[seen])
     return normalised(homographies @ np.linalg.inv(common)), mapped(common, places)
 

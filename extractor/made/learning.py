@@ -1,9 +1,9 @@
 """Learning of the markers' places on one pad, from pictures of this pad at rest.
 
-A pad is not made exactly as designed. Its markers are scattered, and the reader's prior, that the map from layout to
-image is smooth, then holds for no picture of the pad read with the nominal layout. What is smooth is the displacement
-from the places where the markers were made. ``learn_layout`` measures these places. The first reading, with the
-nominal layout, is drawn towards the nominal places; so pictures are read again with what was learnt.
+A made pad differs from its design. Its markers are scattered, and the reader's prior, that the map from layout to
+image is smooth, is then wrong for pictures of the pad that are read with the nominal layout. The displacement
+from the places of the markers as made is smooth. ``learn_layout`` measures these places. The first reading, with the
+nominal layout, is biased towards the nominal places; so pictures are read again with the learnt places.
 """
 
 from __future__ import annotations
@@ -25,26 +25,27 @@ from extractor.result import Markers, Status
 
 PRODUCT = "measured"
 MIN_PICTURES = 10
-MIN_SHARE = 0.5  # of the visible markers, measured in every picture
+MIN_SHARE = 0.5  # of the visible markers, measured in every picture; chosen
 MAX_PICTURE_Z = 2.0
-# After three readings the places are drawn towards the nominal ones by up to 0.5 deviations more (40 pictures, or a
-# scatter of 0.5 px); a fifth reading changes nothing.
+# After three readings the places are biased towards the nominal places by up to 0.5 deviations more (40 pictures, or a
+# scatter of 0.5 px); a fifth reading has no effect.
 READINGS = 4
-DECIMALS = 6  # of a place in mm; a nanometre is less than any pad is read to
+DECIMALS = 6  # of a place in mm; a nanometre is below the accuracy of any reading
 COVARIANCE_DIGITS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class LearntLayout:
-    """The layout of one pad as it is made.
+    """The layout of one pad as made.
 
     Attributes:
         layout: the nominal layout with the places of this pad's markers, and their covariances (``as_made``). A
             marker that no picture shows stays at its nominal place.
         measured: (M,) bool, the markers that were measured.
-        scatter_mm: root mean square distance per axis of the measured places from the nominal ones, what the
-            covariances explain taken off.
-        z: residuals of all readings over their stated deviations. The covariances of the places are stretched by it.
+        scatter_mm: root mean square distance per axis of the measured places from the nominal places, less the part
+            that the covariances explain.
+        z: residuals of all readings over their stated deviations. The covariances of the places are multiplied by z
+            squared.
         picture_z, picture_rms_px: (V,) the same of every picture, and root mean square residual per axis.
         picture_share: (V,) share of the visible markers that a picture measured.
     """
@@ -66,20 +67,22 @@ def learn_layout(
     watch: Callable[[int, int], None] = lambda done, total: None,
     **options: Any,
 ) -> LearntLayout:
-    """The places of a pad's markers from pictures of the pad at rest, from any direction, each by one homography.
+    """The places of a pad's markers from pictures of the pad at rest, from any direction, each picture by one
+    homography.
 
-    The pictures tell the places up to a homography of the whole pad: its position, turn, size, shear and perspective
-    are those that fit the nominal places best. Whatever deforms all pictures alike, as the lens of a camera that cannot
-    move over its pad, goes into the places; for displacements from these places this is harmless.
+    The pictures determine the places up to a homography of the whole pad: its position, turn, size, shear and
+        perspective
+    are those that fit the nominal places best. A deformation of all pictures, as by the lens of a camera that cannot
+    move over its pad, enters the places; this has no effect on displacements from these places.
 
     Args:
         layout: the nominal layout of a triangular pattern, as for ``Extractor``.
         images: 10 pictures or more, as for ``Extractor.extract``.
-        names: of the pictures, for messages; by default "picture 1" and so on.
-        watch: called after every reading of a picture with the numbers of readings that are done and of all; every
+        names: names of the pictures, for messages; by default "picture 1" and so on.
+        watch: called after every reading of a picture with the number of finished readings and of all readings; every
             picture is read ``READINGS`` times.
-        options: of ``Extractor``, such as ``response``. The preset is "accurate" unless another is given: what
-            a preset leaves in all pictures alike no number of pictures takes off.
+        options: options of ``Extractor``, such as ``response``. The preset is "accurate" unless another is given: an
+            error of a preset that is common to all pictures does not fall with their number.
 
     Raises:
         RestError: too few pictures, a picture that is not read, pictures of both sides, or a picture that differs
@@ -106,8 +109,9 @@ def learn_layout(
     worst = int(found.picture_z.argmax())
     if found.picture_z[worst] > MAX_PICTURE_Z:
         raise RestError(
-            f"{names[worst]}: its markers lie {found.picture_rms_px[worst]:.3f} px per axis from a homography of the "
-            f"others' ({found.picture_z[worst]:.1f} stated deviations, limit {MAX_PICTURE_Z:g}); leave it out if the "
+            f"{names[worst]}: the markers lie {found.picture_rms_px[worst]:.3f} px per axis from a homography of the "
+            f"other pictures' ({found.picture_z[worst]:.1f} stated deviations, limit {MAX_PICTURE_Z:g}); leave it out "
+            "if the "
             "pad was pressed or moved, and do not move a camera with lens distortion over the pad"
         )
     return _learnt(layout, current, found, read)
@@ -117,7 +121,7 @@ def _read(extractor: Extractor, image: NDArray[Any], name: str) -> Markers:
     """The markers of one picture.
 
     Raises:
-        RestError: too few of them are measured.
+        RestError: too few markers are measured.
     """
     try:
         markers = extractor.extract(image)
@@ -128,7 +132,7 @@ def _read(extractor: Extractor, image: NDArray[Any], name: str) -> Markers:
         why = f", {markers.reason}" if markers.reason else ""
         raise RestError(
             f"{name}: {share:.0%} of the markers measured{why}; at least {MIN_SHARE:.0%} must be: leave the picture "
-            "out, or check the layout, light, focus and what covers the pad"
+            "out, or check the layout, light, focus and objects on the pad"
         )
     return markers
 
@@ -141,7 +145,7 @@ def _common_side(read: Sequence[Markers], names: Sequence[str]) -> str:
     """The side that all pictures show.
 
     Raises:
-        RestError: they show both.
+        RestError: the pictures show both sides.
     """
     sides = ["back" if markers.mirrored else "front" for markers in read]
     for side, name in zip(sides, names, strict=True):
@@ -162,7 +166,7 @@ def _adjusted(read: Sequence[Markers], names: Sequence[str], layout: Reference) 
 
 
 def _as_made(layout: Reference, found: Adjustment, side: str) -> Reference:
-    """The layout with the places that were found.
+    """The layout with the found places.
 
     Raises:
         LayoutError: its cells overlap.
@@ -175,7 +179,7 @@ def _as_made(layout: Reference, found: Adjustment, side: str) -> Reference:
 
 
 def _rounded(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariances of so many digits that every run of a machine writes the same ones."""
+    """Covariances rounded so that every run on a machine writes the same digits."""
     values = [float(f"{value:.{COVARIANCE_DIGITS - 1}e}") for value in covariance.ravel().tolist()]
     return np.array(values).reshape(covariance.shape)
 

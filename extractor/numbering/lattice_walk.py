@@ -1,9 +1,9 @@
 """Stage 7: numbers the cells by their places in the lattice; the white cell gives the origin.
 
 The spin search walks from face to face of the cell mesh; the inks check every step: across an edge (a, b) of a face
-with the third cell c lies the fourth cell of a rhombus, d = a + b - c, which has the ink of c. So the walk numbers
-everything connected, from any start, and around damage. The result is unique up to rotations by 120 degrees and
-shifts that carry every ink onto itself. The white cell then fixes rotation and origin: its neighbours are one red, one
+with the third cell c lies the fourth cell of a rhombus, d = a + b - c, which has the ink of c. The walk thus numbers
+all connected cells, from any start, and around damage. The result is unique up to rotations by 120 degrees and
+shifts that map every ink onto itself. The white cell then fixes rotation and origin: its neighbours are one red, one
 green and one blue cell with known places.
 """
 
@@ -24,25 +24,27 @@ from extractor.numbering.outline_fit import align_to_outline
 from extractor.numbering.white_search import LayoutPlacement, placements_by_white_cell
 from extractor.result import Origin, Reason
 
-MIN_SCORE_LEAD = 2  # cells, of the best reference over the next one in its component of the mesh
-MAX_MORE_MISSING = 2  # neighbours that a second pad misses more than the best; an outline in view is many
-MIN_RELATIVE_WHITENESS = 0.75  # of the whitest candidate; less white ones are no white cells
+# cells, of the best reference over the next one in its component of the mesh; measured: rule "rivals"
+MIN_SCORE_LEAD = 2
+# neighbours that a second pad misses more than the best; an outline in view is many. Chosen
+MAX_MORE_MISSING = 2
 # A component of the mesh is this pattern if it shows this share of the pattern's cells and hardly any cell is outside.
 MIN_LAYOUT_SHARE = 0.06
-MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout
+MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; chosen
 # At grazing view the mesh breaks into pieces that fit by chance. So a component also holds this share of the meshed
 # cells, or this number.
 MIN_MESH_SHARE = 0.4
 SUFFICIENT_CELLS = 30
 MAX_COMPONENTS = 12
-MIN_COMPONENT_FACES = 5  # of a component whose white cell competes with another's
+MIN_COMPONENT_FACES = 5  # of a component whose white cell competes with another's; chosen
 
 
 class WalkLimits(NamedTuple):
     """Limits of a walk.
 
     Attributes:
-        max_rounds: walks of one component, each without the cells contradicted before; then it is given up.
+        max_rounds: walks of one component, each without the cells contradicted before; then it is given up. Measured:
+            rule "contradictions".
     """
 
     max_rounds: int = 8
@@ -60,9 +62,9 @@ class Numbering:
         mirrored: the pattern is seen from its back.
         white_px: (2,) float64, the center of the white cell; NaN if the outline gave the origin.
         conflicts: number of cells left out because their neighbours contradict each other.
-        doubt: why the reference is not certain; None where it is.
-        origin: what gave the origin.
-        white_adjacent: the white cell touches cells that were numbered by it.
+        doubt: why the reference is not certain; None for a certain reference.
+        origin: the evidence for the origin.
+        white_adjacent: the white cell touches cells that were numbered from it.
     """
 
     cell: NDArray[np.int32]
@@ -100,9 +102,7 @@ class _Candidate(NamedTuple):
         score: ``inside`` minus penalties.
         missing: see ``LayoutPlacement``.
         fits: hardly any walked cell lies outside the layout.
-        white: whiteness of the white cell.
         component: signed number of the component of the mesh.
-        white_adjacent: the component touches the white cell.
         numbering: the numbering.
     """
 
@@ -110,9 +110,7 @@ class _Candidate(NamedTuple):
     score: int
     missing: int
     fits: bool
-    white: float
     component: int
-    white_adjacent: bool
     numbering: Numbering
 
 
@@ -140,11 +138,11 @@ def _walk_largest_components(
 def number_cells(
     image: NDArray[np.uint8], cells: Cells, mesh: CellMesh, lattice: Lattice
 ) -> Numbering | None:
-    """Stage 7: number the component of the mesh that holds the white cell or shows the whole outline.
+    """Stage 7: number the component of the mesh that contains the white cell or shows the whole outline.
 
     If several places of a component may be the white cell, the reference is the one with the most cells inside the
-    layout and the fewest outside. If components disagree, the whiter cell is the reference. The numbering is in doubt
-    if neither rule separates the candidates, or if another white cell has the surroundings of a reference, too.
+    layout and the fewest outside. The numbering is in doubt if that does not separate the candidates, or if another
+    white cell has the surroundings of a reference, too.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.
@@ -162,7 +160,7 @@ def number_cells(
     ]
     found: list[_Candidate] = []
     no_white: list[_WalkedComponent] = []
-    # a white cell explains no more cells than were walked to: with too few in every component no search is needed
+    # a white cell explains at most the walked cells: with too few cells in every component no search is needed
     is_any_large = any(walk.cells >= min_cells for walk in walks)
     for walk in walks:
         placements = placements_by_white_cell(image, cells, lattice, walk.axial) if is_any_large else []
@@ -181,12 +179,11 @@ def number_cells(
 def _select_candidate(found: list[_Candidate], min_cells: float, distance_px: float) -> _Candidate | None:
     """The best candidate that fits with at least ``min_cells`` cells inside.
 
-    It is in doubt if a candidate with the white cell farther away than ``distance_px`` is nearly as good.
+    The candidate is in doubt if another candidate with the white cell farther away than ``distance_px`` is nearly as
+    good.
     """
-    white = MIN_RELATIVE_WHITENESS * max((one.white for one in found if one.fits), default=0.0)
-    found = [one for one in found if one.white >= white]
     large = [one for one in found if one.fits and one.inside >= min_cells]
-    best = max(large, key=lambda one: (one.white_adjacent, one.score), default=None)
+    best = max(large, key=lambda one: one.score, default=None)
     if best is None:
         return None
     middle = best.numbering.white_px
@@ -200,8 +197,10 @@ def _select_candidate(found: list[_Candidate], min_cells: float, distance_px: fl
 def _doubt(best: _Candidate, rivals: list[_Candidate], min_cells: float) -> Reason | None:
     """The reason why the best candidate is not certain.
 
-    A rival with the surroundings of a reference is a second pad: of its layout no more cells are missing in the image
-    than of the best. A white place within a single pad misses the cells beyond the pad's outline, if that is in view.
+    A second candidate with the surroundings of a reference is a second pad: of its layout no more cells are missing in
+        the image
+    than of the best candidate's. A white place within a single pad misses the cells beyond the pad's outline, if the
+    outline is in view.
     """
     others = [one for one in rivals if one.component != best.component and one.fits]
     beside = [one for one in rivals if one.component == best.component]
@@ -233,18 +232,16 @@ def _score_placement(placement: LayoutPlacement, walk: _WalkedComponent) -> _Can
         score,
         placement.missing,
         placement.fits,
-        placement.white,
         walk.component,
-        is_adjacent,
         numbering,
     )
 
 
 def _candidate_from_outline(lattice: Lattice, walk: _WalkedComponent) -> _Candidate | None:
-    """The candidate by the outline, if that is unique."""
+    """The candidate by the outline, if unique."""
     cell = align_to_outline(walk.axial, lattice)
     if cell is None:
         return None
     inside, nowhere = int(np.count_nonzero(cell >= 0)), np.full(2, np.nan)
     numbering = Numbering(cell, walk.front < 0, nowhere, walk.conflicts, origin=Origin.OUTLINE)
-    return _Candidate(inside, inside, 0, True, 0.0, 0, False, numbering)
+    return _Candidate(inside, inside, 0, True, 0, numbering)

@@ -1,4 +1,4 @@
-"""The connected components of the cell mesh, and which of its faces are markers: the start of the numbering."""
+"""The connected components of the cell mesh, and the faces that are markers: the start of the numbering."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from extractor.cells.cells import Cells
 
 
 class MarkerTurnLimits(NamedTuple):
-    """Limits of the samples that tell markers from black cells.
+    """Limits of the samples that distinguish markers from black cells.
 
     Attributes:
-        max_sampled_faces: faces that are sampled to find the orientation of the markers.
-        min_sampled_faces: of each orientation; with fewer the orientation of the markers is unknown.
-        sample_radius: of a color sample, relative to the distance from a face's middle to its nearest cell.
+        max_sampled_faces: faces that are sampled to find the orientation of the markers. Chosen.
+        min_sampled_faces: of each orientation; with fewer the orientation of the markers is unknown. Chosen.
+        sample_radius: of a color sample, relative to the distance from a face's middle to its nearest cell. Chosen.
     """
 
     max_sampled_faces: int = 80
@@ -36,7 +36,7 @@ def largest_components(mesh: CellMesh, count: int) -> list[NDArray[np.intp]]:
 
 
 def marker_turns(image: NDArray[np.uint8], cells: Cells, mesh: CellMesh) -> list[int]:
-    """The possible orientations of the faces that are markers, +1 or -1, the likelier first.
+    """The possible orientations of the faces that are markers, +1 or -1, the likelier orientation first.
 
     Markers are brighter than black cells.
     """

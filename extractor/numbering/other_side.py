@@ -1,4 +1,4 @@
-"""A pattern seen from a side that is not expected: the hues of its inks may tell the cause.
+"""A pattern seen from another side than stated: the hues of its inks may give the cause.
 
 A pattern whose red and blue are swapped, as in an RGB image taken for BGR, is its own mirror image, but its inks then
 have other hues: a hue h becomes 240 - h degrees.
@@ -15,16 +15,16 @@ from extractor.numbering.lattice_walk import Numbering
 from extractor.numeric.bilinear import fill_patch_mean
 from extractor.result import Reason
 
-SAMPLE_RADIUS = 0.1  # of the root of a cell's area, over which its color is averaged
-SWAPPED_HUES_DEG = 240.0  # the sum of a hue and of that with red and blue swapped
-MAX_HUE_ERROR_DEG = 12.0  # of the inks' hues from the palette's; colored light moves them farther
-MAX_HUE_ERROR_RATIO = 0.5  # of the smaller error to the larger one
+SAMPLE_RADIUS = 0.1  # of the root of a cell's area, over which its color is averaged; chosen
+SWAPPED_HUES_DEG = 240.0  # the sum of a hue and of that with red and blue swapped; derived
+MAX_HUE_ERROR_DEG = 12.0  # of the inks' hues from the palette's; colored light moves them farther. Chosen
+MAX_HUE_ERROR_RATIO = 0.5  # of the smaller error to the larger one; chosen
 
 
 def other_side_reason(
     image: NDArray[np.uint8], cells: Cells, numbering: Numbering, palette_hues_deg: NDArray[np.float64]
 ) -> Reason:
-    """Why the pattern may be seen from a side that is not expected.
+    """The cause of a view of another side than stated.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.
@@ -41,12 +41,12 @@ def reason_by_hues(inks: NDArray[np.float64], palette_hues_deg: NDArray[np.float
     """The reason by the inks' colors.
 
     Args:
-        inks: (3, 3) R, G, B of what looks like red, green and blue; NaN where unknown.
+        inks: (3, 3) R, G, B of the inks that look like red, green and blue; NaN where unknown.
         palette_hues_deg: (3,) of the layout's red, green and blue.
     """
     hues = _hues_deg(inks)
     as_is = _hue_error_deg(hues, palette_hues_deg)
-    # what looks like red is blue then
+    # the ink that looks like red is then blue
     swapped = _hue_error_deg(SWAPPED_HUES_DEG - hues[::-1], palette_hues_deg)
     if not min(as_is, swapped) < min(MAX_HUE_ERROR_DEG, MAX_HUE_ERROR_RATIO * max(as_is, swapped)):
         return Reason.OTHER_SIDE

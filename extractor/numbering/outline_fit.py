@@ -15,15 +15,17 @@ class OutlineLimits(NamedTuple):
     """Limits of an alignment with the outline.
 
     Attributes:
-        min_seen_share: of the layout's cells must be found.
-        max_outside_share: of the cells found may lie outside at the best alignment: dirt in the mesh.
-        min_margin_share: more of them must lie outside at every other alignment, and
-        min_margin_cells: at least so many more.
-        shift_margin: lattice steps, by which shifts may exceed the fitting ones.
-        max_alignments: alignments to try; with more possible ones none is certain.
+        min_seen_share: of the layout's cells must be found. Measured: rule "outline".
+        max_outside_share: of the cells found may lie outside at the best alignment: dirt in the mesh. Measured: rule
+            "outline".
+        min_margin_share: so many more of them must lie outside at every other alignment. Measured: rule "outline
+            margin".
+        min_margin_cells: the same, as a number of cells. Measured: rule "outline margin".
+        shift_margin: lattice steps, by which shifts may exceed the fitting ones. Chosen.
+        max_alignments: alignments to try; with more possible ones none is certain. Chosen.
         rim_width: lattice steps from the outermost cells; the cells of this rim are tested first. The result does not
-            depend on it.
-        batch_size: cells that are tested between two comparisons with the limit. Nor on this.
+            depend on it. Chosen.
+        batch_size: cells that are tested between two comparisons with the limit. Nor on this. Chosen.
     """
 
     min_seen_share: float = 0.5
@@ -42,7 +44,7 @@ LIMITS = OutlineLimits()
 def align_to_outline(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32] | None:
     """Align connected cells with the layout's outline.
 
-    All rotations by 120 degrees and all shifts that carry every ink onto itself are tried.
+    All rotations by 120 degrees and all shifts that map every ink onto itself are tried.
 
     Args:
         axial: (N, 2) int32, axial coordinates of the connected cells, up to such a rotation and shift;

@@ -1,8 +1,8 @@
 """Recognises a small pattern in a large image: numbered at a reduced scale by the centers of its cells alone.
 
-Cells of a few pixels have no shape at that scale, but their centers are accurate to a fraction of a pixel. If these
-number the whole pattern, the numbers predict every cell's corners, and the edges are then measured in the full image.
-So no region is grown and no triangle is fitted in the background.
+Cells of a few pixels have no shape at that scale, but their centers are accurate to a fraction of a pixel. If the
+centers number the whole pattern, the numbers predict every cell's corners, and the edges are then measured in the full
+image. So no region is grown and no triangle is fitted in the background.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.affine_maps import LIMITS as AFFINE_MAP_LIMITS
 from extractor.numbering.lattice_walk import Numbering
 
-MIN_CELL_PX = 12  # px^2, area of a domain that may be a cell
-MIN_DOMAINS_PER_CELL = 1.0  # least number of such domains, per cell of the pattern
-MIN_AREA_PX = 8  # px^2, area of a domain that is no speck
-MIN_DOMAIN_SHARE = 0.9  # of the domains are no specks; noise has many specks
-MIN_FITTED_SHARE = 0.97  # of the pattern's cells have edges where predicted
+MIN_CELL_PX = 12  # px^2, area of a domain that may be a cell; chosen
+MIN_DOMAINS_PER_CELL = 1.0  # least number of such domains, per cell of the pattern; chosen
+MIN_AREA_PX = 8  # px^2, area of a domain that is no speck; chosen
+MIN_DOMAIN_SHARE = 0.9  # of the domains are no specks; noise has many specks. Chosen
+MIN_FITTED_SHARE = 0.97  # of the pattern's cells have edges where predicted; chosen
 
 
 def is_small_pattern_possible(seeds: Seeds, cells: int) -> bool:

@@ -23,7 +23,7 @@ SIDE_POINTS = [
 OUTSIDE_POINTS = np.concatenate(
     [1.7 * CORNERS, np.array(SIDE_POINTS) - 0.25 * CORNERS[[2, 2, 2, 0, 0, 0, 1, 1, 1]]]
 )
-GRID, GRID_REACH = 4, 0.8  # half width in points and in axial steps of the grid for the centroid
+GRID, GRID_REACH = 4, 0.8  # half width in points and in axial steps of the grid for the centroid; chosen
 GRID_STEPS = np.arange(-GRID, GRID + 1)
 CENTROID_POINTS = (
     GRID_REACH / GRID * np.array([[a, b] for a in GRID_STEPS for b in GRID_STEPS if abs(a + b) <= GRID])
@@ -50,22 +50,26 @@ class WhiteCellLimits(NamedTuple):
     Whiteness is scaled from 0 for the palest of inks and black to 1 for the middle of the cell.
 
     Attributes:
-        max_fit_cells: numbered cells nearest to the white cell, for its prediction.
-        min_fit_cells: with fewer there is no prediction.
+        max_fit_cells: numbered cells nearest to the white cell, for its prediction. Chosen.
+        min_fit_cells: with fewer there is no prediction. Derived: a linear map has three coefficients.
         ridge: of the cells' total weight; regularises the map's curvature where all these cells lie on one side.
-        weight_softening: a cell's weight is the inverse of this plus the square of its distance, in units of the
-            cells' root mean square distance.
+            Chosen.
+        weight_softening: a cell's weight is the inverse of this plus the square of its distance, in units of the cells'
+            root mean square distance. Chosen.
         min_pivot_share: of the cells' total weight, the least square of the pivot of the slope across; below it the
-            cells lie on one line.
-        max_predicted_deviation: in edges, of the prediction.
+            cells lie on one line. Chosen.
+        max_predicted_deviation: in edges, of the prediction. Chosen.
         max_centroid_distance: in edges, from prediction to centroid of the white; the next black cell is at 1.
-        min_inside: whiteness within the cell.
-        min_corner: whiteness in the corners.
-        max_outside: whiteness outside the cell.
-        min_reach: whiteness above the ground, the least of the middle that the other places are compared with.
-        min_ink_cosine: between a color and an ink, both minus black.
-        min_ink_strength: of an ink's strength above black; weaker colors count as black, a missing cell.
-        sample_radius: of a color sample, relative to the square root of the area spanned by the axial steps.
+            Measured: rule "white centroid".
+        min_inside: whiteness within the cell. Measured: rule "white triangle".
+        min_corner: whiteness in the corners. Measured: rule "white triangle".
+        max_outside: whiteness outside the cell. Measured: rule "white triangle".
+        min_reach: whiteness above the ground, the least of the middle that the other places are compared with. Derived:
+            it only keeps a division from failing.
+        min_ink_cosine: between a color and an ink, both minus black. Measured: rule "between inks".
+        min_ink_strength: of an ink's strength above black; weaker colors count as black, a missing cell. Measured: rule
+            "between inks".
+        sample_radius: of a color sample, relative to the square root of the area spanned by the axial steps. Chosen.
         points: the places that are sampled.
     """
 
@@ -90,7 +94,7 @@ LIMITS = WhiteCellLimits()
 
 
 class WhiteCellLayout(NamedTuple):
-    """The layout as needed for the search of the white cell.
+    """The layout for the search of the white cell.
 
     Attributes:
         layers: number of layers.

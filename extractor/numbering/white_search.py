@@ -1,8 +1,8 @@
 """Searches the white cell, which fixes the rotation and the origin of a numbering.
 
-The white cell is a down-cell; all other down-cells are black. So it is searched where down-cells are predicted: first
-in the middle between three numbered cells, and farther away only if it is not found there. The white cell fills its
-triangle and ends with it, which hardly any dirt or reflection on a black cell does.
+The white cell is a down-cell; all other down-cells are black. Therefore it is searched at the predicted down-cells:
+first in the middle between three numbered cells, and farther away only if it is not found there. The white cell fills
+its triangle and ends at its sides; dirt or a reflection on a black cell hardly ever does.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from extractor.numbering.white_cell import WhiteCellLayout, WhiteCellLimits
 from extractor.numbering.whiteness import LIMITS as WHITENESS_LIMITS
 from extractor.numbering.whiteness import WhitenessLimits, measure_inks
 
-MIN_RELATIVE_BRIGHTNESS = 0.6  # of the brightest; a compressed black cell filled by blur stays below
-
 
 class WhiteSearchLimits(NamedTuple):
     """Limits of the search.
@@ -31,13 +29,16 @@ class WhiteSearchLimits(NamedTuple):
     Brightness is the sum of the channels, relative to that of the inks around.
 
     Attributes:
-        min_white_ratio: brightness of white; blurred black stays below 0.5, dim white is brighter than any ink.
+        min_white_ratio: brightness of white; blurred black stays below 0.5, dim white is brighter than any ink. Chosen.
         max_black_ratio: brightness between the inks: black is darker than the inks even in haze, other images are not.
-        min_black_share: of the places between three cells; the white cell and glare are among these places.
-        min_enclosed_places: such places; if fewer, places next to one or two cells count, too.
-        max_white_candidates: places tried in a ring, the brightest.
-        min_weakest_channel: least whiteness.
-        min_weakest_channel_far: the same where no walked cell touches the place.
+            Measured: rule "dark between inks".
+        min_black_share: of the places between three cells; the white cell and glare are among these places. Measured:
+            rule "dark between inks".
+        min_enclosed_places: such places; if fewer, places next to one or two cells count, too. Measured: rule "dark
+            between inks".
+        max_white_candidates: places tried in a ring, the brightest. Chosen.
+        min_weakest_channel: least whiteness. Chosen.
+        min_weakest_channel_far: the same where no walked cell touches the place. Chosen.
         cell, whiteness, prediction: of the modules that do these steps.
     """
 
@@ -65,7 +66,6 @@ class LayoutPlacement(NamedTuple):
         missing: how often a neighbour of a walked cell lies in the layout and in the image, but was not found.
         fits: hardly any walked cell lies outside the layout.
         white_px: (2,) the center of the white cell.
-        white: its whiteness: its weakest channel, relative to the ink with most of that channel.
         white_adjacent: walked cells touch the white cell.
     """
 
@@ -75,7 +75,6 @@ class LayoutPlacement(NamedTuple):
     missing: int
     fits: bool
     white_px: NDArray[np.float64]
-    white: float
     white_adjacent: bool
 
 
@@ -83,12 +82,11 @@ class _WhiteCandidates(NamedTuple):
     """P bright places, the brightest first.
 
     Attributes:
-        ring: the ring around the known cells in which they were found, -1 if none was.
+        ring: the ring around the known cells in which they were found, -1 if none was found.
         cell: (P, N) int32, the layout's cell of each cell of the image, or -1.
         inside: (P,) int64, how many known cells lie in the layout; 0 where the white cell is not there.
         missing: (P,) int64, see ``LayoutPlacement``.
         center_px: (P, 2) float64, the center of the white cell, NaN where it is not there.
-        brightness, whiteness: (P,) float64.
         fits: (P,) bool, hardly any known cell lies outside the layout.
     """
 
@@ -97,17 +95,15 @@ class _WhiteCandidates(NamedTuple):
     inside: NDArray[np.int64]
     missing: NDArray[np.int64]
     center_px: NDArray[np.float64]
-    brightness: NDArray[np.float64]
-    whiteness: NDArray[np.float64]
     fits: NDArray[np.bool_]
 
 
 def placements_by_white_cell(
     image: NDArray[np.uint8], cells: Cells, lattice: Lattice, axial: NDArray[np.int32]
 ) -> list[LayoutPlacement]:
-    """All placements with the white cell at a bright place; one of them leaves hardly any cell outside the layout.
+    """All placements with the white cell at a bright place; one placement has hardly any cell outside the layout.
 
-    The others are white cells, too, but the walked cells are not this layout around them.
+    The other places are white cells, too, but the walked cells around them are not this layout.
 
     Args:
         image: (H, W, 3) uint8 BGR, at full scale.
@@ -126,7 +122,6 @@ def placements_by_white_cell(
         lattice.layers, lattice.cell_lookup, *lattice.white_cell_frame, lattice.center_mm
     )
     found = _WhiteCandidates(*native.search_white_cell(image, center, axial, known, inks, layout, LIMITS))
-    brightest = found.brightness[found.fits].max(initial=0.0)
     return [
         LayoutPlacement(
             found.cell[n],
@@ -135,9 +130,7 @@ def placements_by_white_cell(
             int(found.missing[n]),
             bool(found.fits[n]),
             found.center_px[n],
-            float(found.whiteness[n]),
             found.ring == 0,
         )
         for n in np.flatnonzero(found.inside)
-        if found.brightness[n] > MIN_RELATIVE_BRIGHTNESS * brightest
     ]

@@ -20,8 +20,9 @@ class WhitenessLimits(NamedTuple):
     """Limits of whiteness.
 
     Attributes:
-        min_channel_balance: of the weakest ratio to the strongest, for places that are not colored.
-        sample_radius: of a color sample, relative to the square root of the cell's area.
+        min_channel_balance: of the weakest ratio to the strongest, for places that are not colored. Measured: rule
+            "channel balance".
+        sample_radius: of a color sample, relative to the square root of the cell's area. Chosen.
     """
 
     min_channel_balance: float = 0.4

@@ -1,8 +1,8 @@
 """Delaunay triangulation of points in the plane, with the triangles' neighbours.
 
-A general library takes twice the time of all the rest of the numbering. Points are inserted one by one along the rows
-of a grid (Lawson 1977): a walk from the point before leads to the triangle that contains the new point; the triangle is
-split; then every edge whose other triangle has the new point in its circumcircle is flipped.
+A general library takes twice the time of the rest of the numbering. Points are inserted one by one along the rows
+of a grid (Lawson 1977): a walk from the previous point leads to the triangle that contains the new point; the triangle
+is split; then every edge whose other triangle has the new point in its circumcircle is flipped.
 """
 
 from __future__ import annotations

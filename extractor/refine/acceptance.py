@@ -20,17 +20,20 @@ class AcceptanceLimits(NamedTuple):
     """Limits of accepted markers, in units of the edges around the marker where nothing else is said.
 
     Attributes:
-        max_shift: from the start place,
-        max_shift_all_cells: and where all triangles agree on that: in steep views these lie so far off.
-        max_deviation: of what is measured.
+        max_shift: from the start place. Chosen.
+        max_shift_all_cells: the same where all triangles agree on that: in steep views these lie so far off. Chosen.
+        max_deviation: of what is measured. Chosen: as many markers at the rim are accepted as with 0.03, when their
+            deviations were stated as if they had neighbours on all sides.
         min_information: 1/px^2, below which a marker counts as unknown: four times that before the measurement.
-        bend_to_end_shift: the shift of a gridline's ends that remains, in deviations of its bending.
+            Derived.
+        bend_to_end_shift: the shift of a gridline's ends that remains, in deviations of its bending. Derived: as in
+            ``BendingLimits``.
         information: of the covariances.
     """
 
     max_shift: float = 0.25
     max_shift_all_cells: float = 0.13
-    max_deviation: float = 0.03
+    max_deviation: float = 0.035
     min_information: float = 4 * PRIOR_PX**-2
     bend_to_end_shift: float = BENDING_LIMITS.bend_to_end_shift
     information: InformationLimits = INFORMATION_LIMITS
@@ -40,13 +43,14 @@ class HiddenMarkerLimits(NamedTuple):
     """Limits of markers that dirt hides, in units of the edges around the marker where nothing else is said.
 
     Attributes:
-        max_shift_unexplained: from the start place, where the drawing explains nothing well.
-        max_shift_from_prediction: from where the neighbours put an unaccepted marker.
-        dot_gain_factor: times the dot gain, added to ``max_shift_unexplained``: corners move most.
-        unexplained_deviation: by dirt, of the visible part where the drawing does not explain the image.
-        dirt_deviation: by dirt, where it does, but no gridline of the marker has any weight.
-        disagreement_scale: of profiles and triangles, where all triangles of a marker were found.
-        max_place_error: between a marker's place by its gridlines and a correct initial place.
+        max_shift_unexplained: from the start place, where the drawing explains nothing well. Chosen.
+        max_shift_from_prediction: from where the neighbours put an unaccepted marker. Chosen.
+        dot_gain_factor: times the dot gain, added to ``max_shift_unexplained``: corners move most. Chosen.
+        unexplained_deviation: by dirt, of the visible part where the drawing does not explain the image. Chosen.
+        dirt_deviation: by dirt, where it does, but no gridline of the marker has any weight. Chosen.
+        disagreement_scale: of profiles and triangles, where all triangles of a marker were found. Chosen.
+        max_place_error: between a marker's place by its gridlines and a correct initial place. Derived: as in
+            ``marker_places``.
     """
 
     max_shift_unexplained: float = 0.13
@@ -99,7 +103,7 @@ def add_dirt_variance(
 
     Args:
         cov: (M, 2, 2) px^2, written.
-        weight: (E,) 0 to 1, of the gridlines; 0 where nothing was measured.
+        weight: (E,) 0 to 1, of the gridlines; 0 for gridlines that were not measured.
         spokes: (M, 6) the gridlines at each marker.
         edge: (M,) px, the length of the edges at each marker.
     """
@@ -146,7 +150,7 @@ def update_lost_markers(
     Args:
         xy, cov: (M, 2) px and (M, 2, 2) px^2; unaccepted markers far from where they are predicted become NaN.
         unaccepted: (M,) bool.
-        predicted: (M, 2) px, where the neighbours put the markers.
+        predicted: (M, 2) px, the markers by their neighbours.
         start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
 
     Returns:

@@ -25,14 +25,14 @@ from extractor.refine.synthesis.ink_levels import InkLevelLimits, InkLevels
 from extractor.refine.synthesis.pixel_rows import LIMITS as ROW_LIMITS
 from extractor.refine.synthesis.pixel_rows import PixelRowLimits
 
-MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn
+MARGIN_SIGMA = 4.0  # blurs around the pattern that are drawn; derived: 6e-5 of a blurred edge lies beyond
 
 
 class DrawingLimits(NamedTuple):
     """Limits of the drawing.
 
     Attributes:
-        blur_step: of the blur, for derivatives of the levels.
+        blur_step: of the blur, for derivatives of the levels. Chosen.
         gridlines: of the gridlines.
         levels: of the inks.
         bleed: of the neighbours' levels.
@@ -56,7 +56,7 @@ class Synthesis(NamedTuple):
 
     Attributes:
         xy, lines, bend: the markers (M, 2) px, the gridlines (E, 8) and their bending (E, 2) px.
-        sides, contrasts: (E, 6) and (E, 3), as ``gridline_sides`` and ``value_contrasts`` give them.
+        sides, contrasts: (E, 6) and (E, 3), as ``GridlineSides`` and ``value_contrasts`` give them.
         added: (E, 6), the light to add on both sides: the black, and the difference of the corrected levels.
         sums: (E, 24), as ``accumulate_residual_sums`` gives them.
         corrected_levels: of the inks, corrected by the residual in the middles of the cells.

@@ -1,4 +1,4 @@
-"""What refinement passes from step to step, and its result."""
+"""The values that refinement passes from step to step, and its result."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from extractor.refine.measure.marker_scatter import NO_SCATTER, MarkerScatter
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.ink_levels import InkLevels, level_change
 
-# Changes of blur and levels, relative, above which an image looks unlike the one before.
+# Changes of blur and levels, relative, above which the appearance of an image differs from the previous image's.
 MAX_BLUR_CHANGE, MAX_LEVEL_CHANGE = 0.06, 0.03
 
 
 class Appearance(NamedTuple):
-    """How an image looks; the next image of a sequence starts from it.
+    """The appearance of an image; the next image of a sequence starts from it.
 
     Attributes:
         scale: by which the image was reduced.
         sigma: the blur, px at that scale.
-        noise: gray levels, one channel, as the residual shows it.
+        noise: gray levels, one channel, from the residual.
         levels: of the inks.
-        pixel_noise: gray levels, one channel, from neighbouring pixels: independent of what the pattern explains.
+        pixel_noise: gray levels, one channel, from neighbouring pixels: independent of the pattern's drawing.
     """
 
     scale: int
@@ -40,7 +40,8 @@ class Appearance(NamedTuple):
         """The appearance in another light.
 
         Args:
-            before, now: (2, C, 3) light of some cells over black, and of their black, then and now.
+            before, now: (2, C, 3) light of some cells over black, and of their black, in the previous and in the
+                present image.
         """
         gain = now[0].sum(axis=0) / np.maximum(before[0].sum(axis=0), 1e-9)
         black = self.levels.black.copy()
@@ -59,14 +60,15 @@ class RefinedMarkers:
     """Markers after refinement.
 
     Attributes:
-        xy_px: (M, 2) float64, NaN where nothing was measured.
-        cov_px2: (M, 2, 2) float64, NaN where nothing was measured.
-        explained: (M,) bool, the pattern explains the image around the marker. Where not, something lies on the marker
+        xy_px: (M, 2) float64, NaN where not measured.
+        cov_px2: (M, 2, 2) float64, NaN where not measured.
+        explained: (M,) bool, the pattern explains the image around the marker. Where not, an object covers the marker
             (and after synthesis, its place is from profiles alone).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, gray levels, one channel.
-        appearance: how the image looks; None where the pattern was not drawn.
-        points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not.
+        appearance: appearance of the image; None where the pattern was not drawn.
+        points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not
+            measured.
         scatter: of the markers, each by itself.
     """
 
@@ -81,7 +83,7 @@ class RefinedMarkers:
 
 
 class PatternState(NamedTuple):
-    """Where the pattern is thought to be: the part of an ``Estimate`` that compiled functions take.
+    """The estimated places of the pattern: the part of an ``Estimate`` for compiled functions.
 
     Attributes:
         xy, hidden, maps, roughness, bend, sigma, noise, dot_gain, scatter: as in ``Estimate``.
@@ -104,10 +106,10 @@ class Estimate(NamedTuple):
     """The current estimate. Places are px in the image at the scale of the step.
 
     Attributes:
-        xy: (M, 2) where the pattern is drawn. Markers that the image shows little or not at all (``hidden``) lie where
-            the maps of their neighbours put them.
-        measured: (M, 2) all markers as the last step left them.
-        reliable: (M, 2) the same, NaN where the image shows them little.
+        xy: (M, 2) places at which the pattern is drawn. Markers that the image hardly shows or does not show
+            (``hidden``) lie at the places by the maps of their neighbours.
+        measured: (M, 2) all markers after the last step.
+        reliable: (M, 2) the same, NaN for markers that the image hardly shows.
         hidden: (M,) bool.
         maps: (M, 2, 5), as ``local_maps`` gives them.
         sigma: the blur, px.
@@ -115,13 +117,14 @@ class Estimate(NamedTuple):
         levels: of the inks.
         pixel_noise: as in ``Appearance``.
         information: about the markers.
-        roughness: (M,) px^2, how rough the markers are around each.
-        bend_variance: (E,) px^2, how freely gridlines may bend beyond the map.
-        bend: (E, 2) px, how far they bend.
-        reading: what that step compared with the image; None before the first step.
-        dot_gain: how far the sides of all cells have moved outward, px.
+        roughness: (M,) px^2, roughness of the markers around each marker.
+        bend_variance: (E,) px^2, variance of the gridlines' bending beyond the map.
+        bend: (E, 2) px, the bending.
+        reading: gridlines and levels that the last step compared with the image; None before the first step.
+        dot_gain: distance by which the sides of all cells have moved outward, px.
         scatter: of the markers, each by itself.
-        convergence_cov_px2: (M, 2, 2) the error that the last step may have left; None where nothing is drawn.
+        convergence_cov_px2: (M, 2, 2) covariance of the remaining error after the last step; None where no pattern is
+            drawn.
     """
 
     xy: NDArray[np.float64]
@@ -143,17 +146,17 @@ class Estimate(NamedTuple):
     convergence_cov_px2: NDArray[np.float64] | None = None
 
     def pattern_state(self) -> PatternState:
-        """The part that compiled functions take; all weights are 1 before the first step."""
+        """The part for compiled functions; all weights are 1 before the first step."""
         weight = np.ones(len(self.bend)) if self.reading is None else self.reading.weight
         where = self.xy, self.hidden, self.maps, self.roughness, self.bend
         return PatternState(*where, weight, self.sigma, self.noise, self.dot_gain, self.scatter)
 
 
 class EdgeContrasts(NamedTuple):
-    """The change of color across the gridlines; it stays the same where gridlines move by a pixel.
+    """The change of color across the gridlines; the change does not depend on shifts of a gridline by a pixel.
 
     Attributes:
-        sides: (E, 6) light on both sides, as ``gridline_sides`` gives it.
+        sides: (E, 6) light on both sides, as ``GridlineSides`` gives it.
         contrasts: (E, 3) gray levels, differences of the values on both sides.
         clearance: (E, 4), as ``gridline_clearance`` gives it.
     """
@@ -164,7 +167,7 @@ class EdgeContrasts(NamedTuple):
 
 
 class StartPlaces(NamedTuple):
-    """Markers before refinement: the part of ``InitialMarkers`` that compiled functions take.
+    """Markers before refinement: the part of ``InitialMarkers`` for compiled functions.
 
     Attributes:
         xy_px: (M, 2) px at the scale of the step, NaN where there is none.
@@ -180,10 +183,10 @@ class StartPlaces(NamedTuple):
 
 
 def places_in_view(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
-    """Places of the full image in a reduced one."""
+    """Places of the full image in a reduced image."""
     return replace(places, xy_px=view.to_level(places.xy_px), edge_px=places.edge_px / view.scale)
 
 
 def start_places(places: InitialMarkers) -> StartPlaces:
-    """The part of the places that compiled functions take."""
+    """The part of the places for compiled functions."""
     return StartPlaces(places.xy_px, places.edge_px, places.agreed, places.is_intact)

@@ -1,4 +1,4 @@
-"""The appearance of an image before anything is measured: noise, levels of the inks, contrasts, and blur."""
+"""The appearance of an image before the first measurement: noise, levels of the inks, contrasts, and blur."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ from extractor.refine.synthesis.blur_bleed import BleedLimits, remove_bleed
 from extractor.refine.synthesis.ink_levels import LIMITS as LEVEL_LIMITS
 from extractor.refine.synthesis.ink_levels import InkLevelLimits, InkLevels
 
-DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured
-MIN_CORRECTED_BLEED = 0.002  # of a neighbour's level in the middle of a cell, above which bleed is removed
+DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured; chosen
+# of a neighbour's level in the middle of a cell, above which bleed is removed; chosen
+MIN_CORRECTED_BLEED = 0.002
 
 
 class FirstLookLimits(NamedTuple):
     """Limits of the first look.
 
     Attributes:
-        fallback_sigma_px: the blur where no gridline shows it.
-        blur_gridlines: gridlines for the first estimate of the blur.
+        fallback_sigma_px: the blur where no gridline shows it. Chosen.
+        blur_gridlines: gridlines for the first estimate of the blur. Chosen.
         noise: of the estimate of the noise.
         levels: of the inks.
         profiles: of the profiles across gridlines.
@@ -60,7 +61,9 @@ def initial_appearance(view: PyramidLevel, topology: Topology, xy: NDArray[np.fl
 def update_edge_contrasts(
     view: PyramidLevel, topology: Topology, estimate: Estimate, lines: NDArray[np.float64]
 ) -> EdgeContrasts:
-    """The contrasts across the gridlines (E, 8). Those beside unknown cells are marked as not known in ``lines``."""
+    """The contrasts across the gridlines (E, 8). Gridlines beside unknown cells are marked as not known in
+    ``lines``.
+    """
     where = lines, estimate.xy, topology
     return EdgeContrasts(*native.edge_contrasts(*where, estimate.levels, view, LIMITS))
 

@@ -1,8 +1,10 @@
-"""Markers that contradict their neighbours: dirt that looks like a gridline has moved them.
+"""Markers that contradict their neighbours, because of dirt that looks like a gridline.
 
-Two independent signs must agree: the gridlines of the marker do not look like the pattern, and most gridlines through
-it show that the map would be smooth if the marker were moved by one vector. The marker then starts again from there.
-Sharp bends, at the rim of an object or where it slips, ask for vectors that differ from one gridline to the next.
+Two independent criteria must agree: the gridlines of the marker do not look like the pattern, and most gridlines
+    through
+the marker show that the map would be smooth if the marker were moved by one vector. The marker then starts again from
+the moved place. Sharp bends, at the rim of an object or where it slips, give vectors that differ from one gridline to
+the next.
 """
 
 from __future__ import annotations
@@ -26,16 +28,19 @@ class OutlierLimits(NamedTuple):
     """Limits of outliers. The native code has room for two ratios and two shifts.
 
     Attributes:
-        min_mean_weight: of the gridlines measured at a marker, below which the marker is suspect.
-        outlier_ratios: shift of an outlier over that of the markers around, of a suspect marker and of any other;
-        min_outlier_shifts: and that shift in edges.
-        min_agreeing_share: the gridlines of a marker agree on a shift if more than this share of them,
-        min_agreeing_gridlines: and no fewer than so many,
-        agreement_tolerance: ask for one that differs by less than this share of the shift.
-        extrapolated_rings: of outliers that the markers around are continued to.
-        max_rounds: an outlier hides the errors of its neighbours.
-        max_place_error: in edges, between a marker's place by its neighbours and a correct initial place.
+        min_mean_weight: of the gridlines measured at a marker, below which the marker is suspect. Chosen.
+        outlier_ratios: shift of an outlier over that of the markers around, of a suspect marker and of any other.
+            Chosen.
+        min_outlier_shifts: the least such shifts, in edges. Chosen.
+        min_agreeing_share: the gridlines of a marker agree on a shift if more than this share of them do. Chosen.
+        min_agreeing_gridlines: the same, as a number of gridlines. Chosen.
+        agreement_tolerance: share of a shift, by which the shifts of gridlines that agree may differ. Chosen.
+        extrapolated_rings: of outliers that the markers around are continued to. Chosen.
+        max_rounds: an outlier hides the errors of its neighbours. Chosen.
+        max_place_error: in edges, between a marker's place by its neighbours and a correct initial place. Derived: as
+            in ``marker_places``.
         rounding_allowance: of the squared least shift; a marker whose largest differences stay below cannot move.
+            Derived: below 1 by more than rounding.
         gridlines: of the maps that continue the markers around.
     """
 
@@ -68,7 +73,7 @@ def correct_outliers(
         view: the image.
         topology: of the layout.
         estimate: after the first round of profiles.
-        profile_weight: (E,) 0 to 1, how well gridlines look like the pattern.
+        profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         places: of the full image.
     """
     assert estimate.reading is not None
@@ -98,7 +103,7 @@ def find_outliers(
         topology: of the layout.
         estimate: after a round of profiles.
         xy: (M, 2) px, NaN where unknown.
-        profile_weight: (E,) 0 to 1, how well gridlines look like the pattern.
+        profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         edge_px: (M,) the length of the edges at each marker.
 
     Returns:

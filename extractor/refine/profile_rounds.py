@@ -1,4 +1,4 @@
-"""A round of profiles: gridlines are read across, weighed, and the markers solved."""
+"""A round of profiles: gridlines are read across and weighted, and the markers are solved for."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 
 SAMPLE_MISFIT_RULE = MisfitRule(1, 4, 1.0)
-MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile
+MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile; chosen
 
 
 class ProfileLimits(NamedTuple):
@@ -36,11 +36,12 @@ class ProfileLimits(NamedTuple):
 
     Attributes:
         misfit_tolerance: of the contrast; what glare and uneven light make in a profile does not lower its weight.
+            Chosen.
         rule: by which gridlines are weighed.
         step: of the step.
         rows: of the rows of pixels.
         dot_gain: of the dot gain.
-        outliers: of the markers around which gridlines are judged.
+        outliers: of the markers around which gridlines are tested.
     """
 
     misfit_tolerance: float = MISFIT_TOLERANCE
@@ -58,7 +59,7 @@ class ProfileStep(NamedTuple):
     """The measurements of a round of profiles, and the solution.
 
     Attributes:
-        profile_weight: (E,) 0 to 1, how well each gridline looks like the pattern.
+        profile_weight: (E,) 0 to 1, similarity of each gridline to the pattern.
         weight: (E,) 0 to 1, with which it was used.
         variance_ratio: (E,), as ``variance_ratios`` gives it; 1 before the last round.
         bend_variance: (E,) px^2.
@@ -95,11 +96,12 @@ def profile_step(
         lines: (E, 8) its gridlines.
         contrasts: across them.
         stations: rows of pixels across each gridline at most.
-        judged: use gridlines by how well they look like the pattern, as in the last round, where they are already
-            close. Before, the best ones look wrong, and it counts only around markers where little else is measured.
+        judged: weight gridlines by their similarity to the pattern, as in the last round, in which they are already
+            close. In earlier rounds the best gridlines look wrong, and the weights are used only around markers with
+            few other measurements.
 
     Returns:
-        The estimate after the round, and (E,) 0 to 1, how well gridlines look like the pattern.
+        The estimate after the round, and (E,) 0 to 1, similarity of gridlines to the pattern.
     """
     state = estimate.pattern_state()
     found = native.profile_step(view, lines, contrasts, state, topology, stations, judged, LIMITS)

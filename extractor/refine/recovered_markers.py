@@ -1,7 +1,7 @@
 """Markers that synthesis has lost, as under dirt and glare, are measured by profiles.
 
-The gridlines at the lost markers are read, weighed and solved for these, between other markers that are held, so that
-the round costs as much as these gridlines. Some gridlines elsewhere show the usual misfit.
+The gridlines at the lost markers are read and weighted, and the lost markers are solved for, with the other markers
+held, so that the time is proportional to these gridlines. Some other gridlines give the usual misfit.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ class RecoveryLimits(NamedTuple):
     """Limits of the round.
 
     Attributes:
-        stations: of a gridline.
-        reference_interval: one of so many other gridlines is read.
-        min_reference_gridlines: other gridlines for the usual misfit; with fewer, all together give it.
+        stations: of a gridline. Chosen.
+        reference_interval: one of so many other gridlines is read. Chosen.
+        min_reference_gridlines: other gridlines for the usual misfit; with fewer, all together give it. Chosen.
         profiles: of the profiles.
         gridlines: of the gridlines.
         acceptance: of the markers.
@@ -72,7 +72,7 @@ def fill_recovered_markers(
     Args:
         view: the image.
         topology: of the layout.
-        estimate: with its pattern where the last step left the markers.
+        estimate: with its pattern at the markers of the last step.
         contrasts: across its gridlines.
         places: before refinement, in the view.
         lost: (M,) bool.

@@ -1,4 +1,4 @@
-"""What every step of refinement does, by profiles or by synthesis: bending of the gridlines, then the markers."""
+"""The common part of steps of refinement, by profiles or by synthesis: bending of the gridlines, then the markers."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from extractor.refine.solve.fisher_information import Information, InformationLi
 from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
 from extractor.refine.synthesis.gridlines import gridlines
 
-PRIOR_PX = 10.0  # deviation of a marker before it is measured
+PRIOR_PX = 10.0  # deviation of a marker before it is measured; chosen, far above any error
 
 
 class MisfitRule(NamedTuple):
-    """How a gridline is weighed by its misfit.
+    """The rule of a gridline's weight by its misfit.
 
     Attributes:
         values: that each of its pixels or samples adds.
-        min_places: pixels or samples, above which it is weighed.
-        default_weight: of a gridline with fewer.
+        min_places: number of pixels or samples above which the gridline is weighted.
+        default_weight: weight of a gridline with fewer.
     """
 
     values: int
@@ -46,7 +46,7 @@ class StepLimits(NamedTuple):
     """Limits of a step.
 
     Attributes:
-        prior_px: deviation of a marker before it is measured.
+        prior_px: deviation of a marker before it is measured. Chosen.
         weights: of the gridlines.
         bending: of the gridlines.
         information: about the markers.
@@ -64,11 +64,11 @@ LIMITS = StepLimits()
 
 
 class ExtrapolatedPattern(NamedTuple):
-    """Markers with those just beyond the known ones.
+    """Markers, with the markers next to known markers.
 
     Attributes:
-        xy: (M, 2) px; unknown markers beside known ones lie where the maps of these put them.
-        hidden: (M,) bool, the markers put that way.
+        xy: (M, 2) px; unknown markers beside known markers lie at the places by the maps of the known markers.
+        hidden: (M,) bool, the markers that were placed in this way.
         maps: (M, 2, 5) the map at each marker, as ``local_maps`` gives it.
     """
 
@@ -87,12 +87,12 @@ class StepSolution(NamedTuple):
 
 
 def extrapolate_pattern(xy: NDArray[np.float64], topology: Topology) -> ExtrapolatedPattern:
-    """The markers (M, 2), NaN where unknown, with those just beyond the known ones."""
+    """The markers (M, 2), NaN where unknown, with the markers next to known markers."""
     return ExtrapolatedPattern(*native.extrapolate_pattern(xy, topology, GRIDLINE_LIMITS))
 
 
 def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
-    """The estimate with its pattern where the last step left the markers."""
+    """The estimate with its pattern at the markers of the last step."""
     return estimate._replace(**extrapolate_pattern(estimate.reliable, topology)._asdict())
 
 

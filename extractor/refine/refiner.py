@@ -1,8 +1,8 @@
 """Stage 9: all markers are solved together, from profiles across the gridlines and then by synthesis.
 
-Profiles reduce the error from a pixel to some hundredths of one. From there a step by synthesis is a Gauss-Newton step
-on the likelihood of the whole image, with the curvature that includes the overlap of the gridlines at the corners. One
-such step is nearly enough.
+Profiles reduce the error from a pixel to some hundredths of a pixel. From there a step by synthesis is a Gauss-Newton
+step on the likelihood of the whole image, with the curvature that includes the overlap of the gridlines at the corners.
+One such step is nearly enough.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
 from extractor.refine.synthesis_steps import SynthesisSolver
 
-SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first
-SMALL_BLUR = 0.12  # of an edge; above, one edge is blurred into the next
-SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at a reduced scale
+SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first. Chosen
+SMALL_BLUR = 0.12  # of an edge; above, one edge is blurred into the next. Chosen
+SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at a reduced scale; chosen
 MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
-MIN_BLUR_PX = 0.65  # or that blur
+MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
 # Noise of the drawing over that of the pixels, above which the drawing explains too little to move a marker far.
 UNEXPLAINED_NOISE_RATIO = 3.0
 
@@ -69,7 +69,7 @@ class FullScaleLimits(NamedTuple):
     """Limits of the markers at the full scale.
 
     Attributes:
-        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree.
+        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree. Chosen.
     """
 
     agreed_deviation: float = AGREED_DEVIATION
@@ -95,8 +95,8 @@ class Refiner:
 
         Args:
             pyramid: the image.
-            places: where the markers were found, to about a pixel.
-            before: the appearance of the image before, in a sequence.
+            places: the markers' places, to about a pixel.
+            before: the appearance of the previous image of a sequence.
         """
         short_edge, usual_edge = short_edges(
             places.xy_px, self._topology.edges, SHORTEST_RARITY, SHORT_RARITY
@@ -140,7 +140,7 @@ class Refiner:
             view: the image.
             places: of the full image.
             start: (M, 2) px in the full image, where the profiles are.
-            before: the appearance of the image before, in a sequence.
+            before: the appearance of the previous image of a sequence.
 
         Returns:
             The estimate, the contrasts across the gridlines, and the places without outliers.
@@ -184,7 +184,7 @@ class Refiner:
         places: InitialMarkers,
         edge_px: float,
     ) -> RefinedMarkers:
-        """The last round of profiles, or synthesis where the blur asks for it.
+        """The last round of profiles, or synthesis where the blur requires it.
 
         Args:
             view: the image.
@@ -222,7 +222,9 @@ class Refiner:
     def _accept_or_recover(
         self, view: PyramidLevel, estimate: Estimate, contrasts: EdgeContrasts, places: InitialMarkers
     ) -> RefinedMarkers:
-        """The accepted markers; where the drawing does not explain the image, as in glare, those by many profiles."""
+        """The accepted markers; where the drawing does not explain the image, as in glare, the markers by many
+        profiles.
+        """
         xy, cov = self._accepted_markers(estimate, places)
         unexplained = estimate.noise > UNEXPLAINED_NOISE_RATIO * estimate.pixel_noise
         start = places.xy_px, places.edge_px

@@ -1,4 +1,4 @@
-"""Steps by synthesis: the pattern is drawn and compared with the image, and all markers are solved."""
+"""Steps by synthesis: the pattern is drawn and compared with the image, and all markers are solved for."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 
-WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending
+WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending. Chosen
 # Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
 # (rendered patterns, shifted), at most by MAX_OVERLAP.
 OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
-MAX_PICTURES = 2  # kept, for images of so many shapes
+MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
 NO_CLEARANCE = np.empty((0, 4))
 
 
@@ -44,12 +44,12 @@ class SynthesisLimits(NamedTuple):
     """Limits of a step by synthesis.
 
     Attributes:
-        rule: by which gridlines are weighed.
+        rule: rule of the gridlines' weights.
         step: of the step.
         dot_gain: of the dot gain.
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
-            follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge
-            by 0.15 in the second step.
+            follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
+            0.15 in the second step. Measured: rule "settled appearance".
     """
 
     rule: MisfitRule = PIXEL_MISFIT_RULE
@@ -96,7 +96,7 @@ class SynthesisSolver:
         self._kept = threading.local()
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the pictures of the threads."""
+        """The state without the pictures of the threads."""
         return {name: value for name, value in self.__dict__.items() if name != "_kept"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -104,7 +104,7 @@ class SynthesisSolver:
         self._kept = threading.local()
 
     def picture(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        """(H, W, 3) the thread's picture of a shape: the light of the pattern over black, as last drawn."""
+        """(H, W, 3) the thread's picture of a shape: the light of the pattern over black, from the last drawing."""
         kept: dict[tuple[int, ...], NDArray[np.float32]] | None = getattr(self._kept, "pictures", None)
         if kept is None:
             kept = self._kept.pictures = {}
@@ -119,43 +119,44 @@ class SynthesisSolver:
 
         Args:
             view: the image.
-            estimate: with its pattern where the last step left the markers.
-            schedule: how many steps at most, and after which move none follows.
+            estimate: with its pattern at the markers of the last step.
+            schedule: largest number of steps, and the move after which no step follows.
             usual_px: a usual edge in the view.
         """
         wide_blur = estimate.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
+        shift = np.full_like(estimate.xy, np.nan)
         for step in range(schedule.steps):
             if step > 0:
                 estimate = with_pattern_moved(self._topology, estimate)
-            judged = step > 0  # the misfit of the first step is that of its start
+            judged = step > 0  # the misfit of the first step is the misfit of its start
             before = self._with_bending(estimate, wide_blur, judged)
             stepped, drawing = self._full_step(view, before, judged)
             estimate = _overlap_corrected(stepped, drawing)
             change_px = abs(estimate.sigma - drawing.sigma) + abs(estimate.dot_gain - before.dot_gain)
             is_settled = change_px < LIMITS.small_change * drawing.sigma
-            shift = estimate.measured - drawing.xy
+            last, shift = shift, estimate.measured - drawing.xy
             if judged and is_settled and typical_move(shift, estimate.information) < schedule.small_move:
                 break
         remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawing.edge_px) ** 2 if wide_blur else 0.0
-        cov = convergence_covariance(estimate.measured - drawing.xy, drawing.sigma, remaining)
+        cov = convergence_covariance(shift, last, drawing.sigma, remaining)
         return estimate._replace(convergence_cov_px2=cov)
 
     def _with_bending(self, estimate: Estimate, wide_blur: bool, judged: bool) -> Estimate:
-        """The estimate with the roughness and the scatter that let its gridlines bend; with none where blur is wide.
+        """The estimate with the roughness and the scatter that let its gridlines bend; without both where blur is wide.
 
-        There the gridlines would take up the error of the markers beside them, which would hardly move.
+        With wide blur, gridlines would bend instead of correcting the markers beside them.
         """
         if wide_blur:
             return _without_bending(estimate)
         return with_roughness(self._topology, estimate, by_synthesis=judged)
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate, judged: bool) -> tuple[Estimate, Synthesis]:
-        """A step from everything."""
+        """A step from all measurements."""
         drawing = draw_pattern(view, self._topology, estimate, self.picture(view.image.shape))
         return self._update_estimate(estimate, drawing, judged), drawing
 
     def _update_estimate(self, estimate: Estimate, drawing: Synthesis, judged: bool) -> Estimate:
-        """The estimate after the step that the sums of the drawing ask for."""
+        """The estimate after the step by the sums of the drawing."""
         topology, levels = self._topology, drawing.corrected_levels
         found = native.update_and_solve(drawing, estimate.pattern_state(), topology, judged, LIMITS)
         read = SynthesisReading(*(*found[:-1], step_solution(*found[-1])))
@@ -185,7 +186,7 @@ def _without_bending(estimate: Estimate) -> Estimate:
 
 
 def _overlap_corrected(estimate: Estimate, drawing: Synthesis) -> Estimate:
-    """The estimate after a step that is as long as it would be if gridlines did not overlap."""
+    """The estimate after a step of the length without overlap of gridlines."""
     missing = min(OVERLAP_FACTOR * (drawing.sigma / drawing.edge_px) ** 2, MAX_OVERLAP)
     measured = estimate.measured + missing / (1.0 - missing) * (estimate.measured - drawing.xy)
     reliable = np.where(np.isnan(estimate.reliable), np.nan, measured)

@@ -81,12 +81,12 @@ class View:
         mirrored: an odd number of mirrors between the pattern and the camera; None: by det R, False without R.
         R_camera_from_layout: (3, 3) float64, orthonormal, det -1 where mirrored; None: not known.
         t_camera_from_layout_mm: (3,) float64; None: not known.
-        medium: what light passes between the pattern and the camera; None or layers of 0 mm: air.
-        window: the window's outer face in the camera's frame; its gel then reaches to wherever the pattern is. None:
-            the window is parallel to the pattern at rest, ``gel_mm`` before it.
+        medium: layers between the pattern and the camera; None or layers of 0 mm: air.
+        window: the window's outer face in the camera's frame; the gel then reaches from the window to the pattern.
+            None: the window is parallel to the pattern at rest, ``gel_mm`` before it.
 
     Raises:
-        RigError: a value that no camera has.
+        RigError: a value that is impossible for a camera.
     """
 
     name: str
@@ -233,9 +233,9 @@ class View:
         return undistort_points(distorted, self.distortion, self.fold_radius)
 
     def rays(self, xy_px: Array) -> Lines:
-        """The lines of sight of pixels (N, 2) in the layout frame, as they are where the pattern lies.
+        """The lines of sight of pixels (N, 2) in the layout frame, at the pattern.
 
-        In air all start at the camera, behind a window at its inner face; NaN as ``normalised``.
+        In air all lines start at the camera, behind a window at its inner face; NaN as in ``normalised``.
         """
         normalised = self.normalised(xy_px)
         direction = np.column_stack([normalised, np.ones(len(normalised))])
@@ -296,8 +296,8 @@ def distort_points(normalised: Array, distortion: tuple[float, ...]) -> tuple[Ar
 def undistort_points(distorted: Array, distortion: tuple[float, ...], fold_radius: float = np.inf) -> Array:
     """(N, 2) undistorted coordinates of distorted ones (N, 2), by damped Newton steps to 1e-13; NaN without an inverse.
 
-    The usual fixed-point iteration diverges at strong distortion without notice. A result of this function lies within
-    the fold radius and is mapped onto the input again.
+    The usual fixed-point iteration may diverge at strong distortion without an error. A result of this function lies
+    within the fold radius and is mapped onto the input again.
     """
     if not any(distortion):
         return distorted.copy()
@@ -348,7 +348,7 @@ def _damped_step(
 ) -> Array:
     """(N, 2) points after their steps, each halved until its ``error`` (N,) decreases within the fold radius.
 
-    Points whose error does not decrease keep their place.
+    Points whose error does not decrease are not moved.
     """
     moved = start.copy()
     waiting = np.isfinite(step).all(axis=1)

@@ -18,11 +18,11 @@ from extractor.layout.reference import Reference
 from extractor.numeric.nearest_points import nearest_points
 from extractor.space.camera import Array, is_finite
 
-MIN_CUBIC_NEIGHBOURS = 10  # known neighbours for the polynomial of 9 terms
+MIN_CUBIC_NEIGHBOURS = 10  # known neighbours for the polynomial of 9 terms; derived: one equation over
 MIN_QUADRATIC_NEIGHBOURS = 5  # for that of 5 terms; fewer get the plane
-MAX_CONDITION = 1e3  # of the normal equations; complete rings have 4 to 170
-CANDIDATES = 12  # nearest triangles (by centroid) that are searched for a point
-MIN_BARYCENTRIC = -1e-9  # of a point in a triangle
+MAX_CONDITION = 1e3  # of the normal equations; complete rings have 4 to 170. Chosen above these
+CANDIDATES = 12  # nearest triangles (by centroid) that are searched for a point; chosen
+MIN_BARYCENTRIC = -1e-9  # of a point in a triangle; derived: rounding
 
 
 class Field:
@@ -43,12 +43,14 @@ class Field:
         if corners.shape[1] == 4:
             corners = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
         self.triangles: NDArray[np.int32] = corners
-        self._last_stencil: tuple[bytes, Array] | None = None  # of the markers known last, with this key
+        self._last_stencil: tuple[bytes, Array] | None = (
+            None  # weights of the last known markers, with this key
+        )
         self._ring_markers = _two_rings(np.asarray(layout.edges), len(self.xy_mm))
         self._edge_mm = float(np.linalg.norm(np.diff(self.xy_mm[layout.edges], axis=1)[:, 0], axis=1).mean())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is built anew from the layout."""
+        """A copy is made from the layout."""
         return type(self), (self._layout,)
 
     @cached_property

@@ -40,7 +40,7 @@ class Medium:
         window_index: its index of refraction; needed where there is a window.
 
     Raises:
-        RigError: a value that no layer has.
+        RigError: a value that is impossible for a layer.
     """
 
     gel_mm: float = 0.0
@@ -72,7 +72,7 @@ class Medium:
 
     @property
     def apparent_shift_mm(self) -> float:
-        """By how much nearer the pattern at rest appears to a ray along the normal."""
+        """The apparent shift of the pattern at rest towards the camera, for a ray along the normal."""
         return self.window_mm * (1 - 1 / self._window_index) + self.gel_mm * (1 - 1 / self._gel_index)
 
     @property
@@ -97,7 +97,7 @@ class WindowPlane(NamedTuple):
 
 
 class PlacedWindow(NamedTuple):
-    """A window's outer face in a camera's frame, and how it moves with the pattern's pose (see ``Linearisation``).
+    """A window's outer face in a camera's frame, and its derivatives by the pattern's pose (see ``Linearisation``).
 
     Attributes:
         medium: the layers.
@@ -115,7 +115,7 @@ class PlacedWindow(NamedTuple):
 
 
 class Directions(NamedTuple):
-    """Where a camera sees N points, as directions in its frame; NaN where it does not.
+    """The directions in which a camera sees N points, in its frame; NaN for points that it does not see.
 
     Attributes:
         xyz: (N, 3) float64, of any length.
@@ -129,7 +129,7 @@ class Directions(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """N lines of sight behind the window; NaN where there is none.
+    """N lines of sight behind the window; NaN without a line of sight.
 
     Attributes:
         origin_mm: (N, 3) float64, a point of each line.
@@ -170,7 +170,7 @@ def gel_depth_mm(window: PlacedWindow, xyz_mm: Array) -> Array:
 
 
 def refract_points(window: PlacedWindow, rotated: Array, shift_mm: Array) -> Directions:
-    """Where the camera sees points through window and gel.
+    """The directions in which the camera sees points through window and gel.
 
     Args:
         window: in the camera's frame.
@@ -217,7 +217,7 @@ def refract_rays(window: PlacedWindow, direction: Array) -> Lines:
 
 
 def _sideways(tangent: Array, index: float) -> Array:
-    """(N,) k(q; m), see the module: the way sideways per depth, over q."""
+    """(N,) k(q; m), see the module: the sideways offset per depth, over q."""
     return np.asarray(1 / np.sqrt(index**2 + (index**2 - 1) * tangent**2))
 
 

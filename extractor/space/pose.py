@@ -20,13 +20,13 @@ from extractor.space.medium import Medium
 from extractor.space.pose_refinement import RefinedPoses, RestMarkers, refine_poses
 from extractor.space.rest_check import RestViews, rest_warning
 
-MIN_MARKERS = 6  # of a view, for a pose
-MAX_CONDITION = 1e4  # of the markers' scatter; collinear markers determine no pose
-OUTLIER_RATIO = 6.0  # misfit of an outlier relative to the median
-MAX_OUTLIER_ROUNDS = 3
-MIN_CHI2_GAP = 25.0  # between the two poses of a plane; 5 standard deviations
-MAX_RMS_EDGES = 0.2  # RMS residual at rest, in edges
-SAME_DEG = 0.5  # angle below which two poses are the same
+MIN_MARKERS = 6  # of a view, for a pose; chosen: six unknowns, twice as many equations
+MAX_CONDITION = 1e4  # of the markers' scatter; collinear markers determine no pose. Chosen
+OUTLIER_RATIO = 6.0  # misfit of an outlier relative to the median; chosen
+MAX_OUTLIER_ROUNDS = 3  # of dropping such markers; chosen
+MIN_CHI2_GAP = 25.0  # between the two poses of a plane; 5 standard deviations. Chosen
+MAX_RMS_EDGES = 0.2  # RMS residual at rest, in edges; chosen
+SAME_DEG = 0.5  # angle below which two poses are the same; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,8 @@ class Poses:
         misfit: RMS of the residuals in standard deviations, over the degrees of freedom; NaN with none estimated.
         rms_px: (V,) float64, RMS residual per axis.
         used: (M,) bool, the markers that were used.
-        warning: why the markers at rest contradict the views, as far as it shows; empty where they fit.
+        warning: likely cause of a contradiction between the markers at rest and the views; empty without a
+            contradiction.
     """
 
     views: tuple[View, ...]
@@ -54,15 +55,16 @@ class Poses:
 def estimate_poses(
     views: Sequence[View], xy_mm: Array, xy_px: Array, cov_px2: Array, spread_mm: tuple[float, float, float]
 ) -> Poses:
-    """The poses of the views that have none, from markers at rest on the layout's plane.
+    """The poses of the views without poses, from markers at rest on the layout's plane.
 
     Args:
-        views: V views; those with a pose keep it.
+        views: V views; given poses are kept.
         xy_mm: (M, 2) the markers in the layout.
         xy_px: (V, M, 2) the markers in each view, NaN where not seen.
         cov_px2: (V, M, 2, 2).
         spread_mm: standard deviations in x, y, z of the markers at rest around the layout. With 0, each view is
-            placed by itself; else all views are placed jointly, and the deviation that they agree on is the markers'.
+            placed separately; else all views are placed jointly, and deviations common to all views belong to the
+            markers.
 
     Raises:
         PoseError: too few markers, collinear markers, or two poses that the image does not distinguish.
@@ -140,7 +142,7 @@ def _estimate_planar_pose(view: View, flat_mm: Array, xy_px: Array, cov_px2: Arr
 
 
 def _behind_medium(view: View, rotation: Array, shift_mm: Array) -> tuple[Array, Array]:
-    """The pose R, t of a pattern that appears at this one through the view's window and gel, near their normal."""
+    """The pose R, t of a pattern that appears at this pose through the view's window and gel, near their normal."""
     if view.medium is None:
         return rotation, shift_mm
     normal = rotation[:, 2] if rotation[:, 2] @ shift_mm > 0 else -rotation[:, 2]
@@ -204,13 +206,13 @@ def _require_small_residuals(
 
 
 def _require_one_side(views: Sequence[View]) -> None:
-    """Check that all views look at the same side: a wrong ``mirrored`` puts a camera on the other side."""
+    """Check that all views see the same side: a wrong ``mirrored`` puts a camera on the other side."""
     front = [view.name for view in views if view.position_mm[2] > 0]
     back = [view.name for view in views if view.position_mm[2] <= 0]
     if front and back:
         raise PoseError(
-            f"{_view_list_text(front)} would look at the pattern's front, {_view_list_text(back)} at its back; "
-            "check which of them are mirrored"
+            f"{_view_list_text(front)} would see the pattern's front, {_view_list_text(back)} its back; "
+            "check which views are mirrored"
         )
 
 

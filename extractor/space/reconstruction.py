@@ -1,7 +1,7 @@
 """From the markers of two or more views to the surface in space: positions, displacements, normals, covariances.
 
 All results are in mm of the layout frame: x right, y up, z out of the front. The views' poses are estimated once, from
-the markers at rest; each frame is then reconstructed by itself, so nothing drifts.
+the markers at rest; each frame is then reconstructed independently, so there is no drift.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
 from extractor.space.triangulation import GATE_SIGMAS, INFLATION_SIGMAS, PointReason, Points, triangulate
 
-MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position above which it is not reported, in edges
-NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers above which covariances are inflated
-MIN_REST_MARKERS = 3  # markers that must have a position at rest
+MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position above which it is not reported, in edges; chosen
+NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers above which covariances are inflated; chosen
+MIN_REST_MARKERS = 3  # markers that must have a position at rest; derived: a plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Shape:
         displacement_mm: (M, 3) float64, from the rest frame.
         displacement_cov_mm2: (M, 3, 3) float64; errors of the poses that both frames share cancel.
         normals: (M, 3) float64, unit vectors out of the front.
-        status: (M,) uint8, a ``Status`` each: the weakest one of the views'.
+        status: (M,) uint8, a ``Status`` each: the weakest status of the views.
         reason: (M,) uint8, a ``PointReason`` each: why a marker has no position.
         misfit: (M,) float64, the distance by which the rays miss each other, in standard deviations; also of markers
             that are not reported for this reason.
@@ -45,7 +45,7 @@ class Shape:
             the markers, by edge from its smaller id.
         virtual_cov_mm2: (E, m, 3, 3) float64.
         virtual_status: (E, m) uint8, a ``VirtualStatus`` each.
-        problem: which views show nothing, and why; empty where all views show the pattern.
+        problem: the views without a pattern, and why; empty where all views show the pattern.
     """
 
     xyz_mm: Array
@@ -99,7 +99,7 @@ class Reconstructor:
     Attributes:
         poses: the views with their poses, see ``Poses``.
         rest_xyz_mm: (M, 3) float64, the markers at rest.
-        warnings: what makes the results doubtful: markers at rest that contradict the rig.
+        warnings: reasons to doubt the results: markers at rest that contradict the rig.
 
     Raises:
         PoseError: fewer than two views, a view whose pose cannot be estimated, or views that give no depth.
@@ -142,7 +142,7 @@ class Reconstructor:
         self._rest_virtual_mm = self._virtual(self.rest_xyz_mm)
 
     def reconstruct(self, markers: Sequence[Markers | None]) -> Shape:
-        """The surface that the views show; a view that shows nothing raises no error.
+        """The surface that the views show; a view without a pattern raises no error.
 
         Args:
             markers: view by view, in the rig's order and the frame of the full image; None: no image.
@@ -194,8 +194,8 @@ class Reconstructor:
         for view, markers in zip(views, rest, strict=True):
             if markers.reason in SIDE_REASONS:
                 raise PoseError(
-                    f"view {view.name!r} shows the pattern's other side at rest ({markers.reason}); check which of "
-                    "them are mirrored, and state side or channels"
+                    f"view {view.name!r} shows the pattern's other side at rest ({markers.reason}); check which "
+                    "views are mirrored, and state side or channels"
                 )
             if not markers.found:
                 raise PoseError(
@@ -207,7 +207,7 @@ class Reconstructor:
         for view, markers in zip(poses.views, rest, strict=True):
             if markers.mirrored is not None and markers.mirrored != appears_mirrored(view):
                 raise PoseError(
-                    f"view {view.name!r}: its pose looks at the pattern from the other side than the rest frame shows; "
+                    f"view {view.name!r}: its pose faces the other side of the pattern than the rest frame shows; "
                     "check R_camera_from_layout and mirrored"
                 )
         return poses
@@ -224,7 +224,8 @@ class Reconstructor:
         why = PointReason(int(reasons.argmax())) if both.any() else PointReason.ONE_VIEW
         names = " and ".join(repr(view.name) for view in self.rig.views)
         texts = {
-            PointReason.PARALLEL: "stand too near to each other to tell depth: a position's standard deviation would "
+            PointReason.PARALLEL: "stand too near to each other to measure depth: a position's standard deviation "
+            "would "
             f"exceed {self._max_sigma_mm:.3g} mm",
             PointReason.DISAGREE: "contradict each other at rest; check their intrinsics and which are mirrored",
             PointReason.ONE_VIEW: "show no marker in common",

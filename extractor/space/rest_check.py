@@ -1,7 +1,8 @@
-"""Whether the markers at rest lie where their poses put them, and if not, what most likely moves them.
+"""Whether the markers at rest lie at the places by the poses, and if not, the likely cause.
 
 Every cause is a model with more parameters: another gel, another lens, other poses, markers that have moved. The likely
-one has the smallest final prediction error (Akaike 1969), chi^2 / (N - K) (1 + K / N) with N numbers and K parameters.
+cause has the smallest final prediction error (Akaike 1969), chi^2 / (N - K) (1 + K / N) with N numbers and K
+parameters.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from extractor.space.camera import Array, View, is_finite
 from extractor.space.medium import Medium, WindowPlane
 from extractor.space.pose_refinement import RefinedPoses, RestMarkers, refine_poses
 
-MAX_MISFIT = 3.0  # RMS residual at rest in its deviations, above which the model of the sensor is doubted
-EXPLAINED = 0.5  # share of the misfit that the likely cause may leave
+# RMS residual at rest in its deviations, above which the model of the sensor is doubted; chosen
+MAX_MISFIT = 3.0
+EXPLAINED = 0.5  # share of the misfit that the likely cause may leave; chosen
 USUAL_GEL_INDEX, USUAL_WINDOW_INDEX = 1.41, 1.49  # silicone and acrylic, where the rig has none
 GEL_TOLERANCE_MM = 0.01
 STEPS = {"window_mm": 0.1, "gel_index": 0.01, "window_index": 0.01}
@@ -31,7 +33,7 @@ ANYWHERE_MM2 = np.eye(3)  # covariance of markers that have moved
 NO_MEDIUM = "the camera looks through a gel or a window, and the rig has no [medium]"
 OTHER_MEDIUM = "the gel or the window is not as in [medium] (thickness, index or tilt)"
 OTHER_LENS = "the lens is not as in the rig (focal_px, centre_px, distortion)"
-OTHER_POSES = "the rig's poses are not those of this frame; let it place the views (--from-rest)"
+OTHER_POSES = "the rig's poses are not those of this frame; place the views by the rest frame (--from-rest)"
 MOVED = "the pattern was touched or not flat; take a frame without contact, or state a dome's height (flatness_mm)"
 UNKNOWN = "none that is known; check the layout, the rig and the rest frame"
 
@@ -63,7 +65,7 @@ def rest_warning(found: RestViews) -> str:
         likely = UNKNOWN
     return (
         f"the markers at rest lie {np.sqrt(np.nanmean(fitted.residual_px**2)):.2f} px from their places, {misfit:.0f} "
-        f"times their deviations; depths are wrong by more than they say; likely cause: {likely}"
+        f"times their deviations; depths have larger errors than stated; likely cause: {likely}"
     )
 
 
@@ -90,7 +92,7 @@ def _medium_error(found: RestViews) -> float:
         changed = [replace(view, medium=replace(_whole_medium(view), gel_mm=gel_mm)) for view in views]
         try:
             return refine_poses(changed, rest, free)
-        except PoseError:  # no room for this gel
+        except PoseError:  # this gel does not fit
             return None
 
     def chi2(gel_mm: float) -> float:
@@ -121,7 +123,7 @@ def _least_place(function: Callable[[float], float], low: float, high: float, to
 
 
 def _whole_medium(view: View) -> Medium:
-    """The view's medium with usual indices for what it lacks."""
+    """The view's medium with usual indices for missing values."""
     medium = view.medium or Medium()
     return replace(
         medium,
@@ -131,7 +133,7 @@ def _whole_medium(view: View) -> Medium:
 
 
 def _medium_columns(views: Sequence[View], flat_mm: Array) -> Iterator[Array]:
-    """(V, M, 2) px by which the markers move with each parameter of the medium, which all views share."""
+    """(V, M, 2) px by which the markers move with each parameter of the medium, which is common to all views."""
     for field, step in STEPS.items():
         changed = []
         for view in views:
@@ -176,7 +178,9 @@ def _moved_px(views: Sequence[View], changed: Sequence[View], flat_mm: Array) ->
 
 
 def _explained_error(found: RestViews, residual_px: Array, columns: Sequence[Array]) -> float:
-    """The prediction error that the free poses and parameters with these columns (V, M, 2) leave of residuals."""
+    """The prediction error of residuals after a fit of the free poses and of parameters with these columns (V, M,
+    2).
+    """
     views, rest, free = found.views, found.rest, found.free
     for v in np.flatnonzero(free).tolist():
         by_pose = np.zeros((6, len(views), len(rest.flat_mm), 2))

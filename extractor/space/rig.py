@@ -1,6 +1,6 @@
 """The rig file: the views of a sensor. TOML, one [[view]] table for each view; unknown names are refused.
 
-A scene file or a sensor file serves as a rig, too: only its [[view]] tables and its [medium] are read.
+A scene file or a sensor file can also be used as a rig: only its [[view]] tables and its [medium] are read.
 
 [[view]]
 name = "left"
@@ -44,7 +44,7 @@ NUMBER_COUNTS = {
 REQUIRED_FIELDS = ("focal_px", "centre_px")
 KNOWN_FIELDS = ("name", *NUMBER_COUNTS, "mirrored", "R_camera_from_layout", "window_distance_mm")
 MEDIUM_FIELDS = ("gel_mm", "gel_index", "window_mm", "window_index")
-# What stands beside [[view]] in the files of scenes and of sensors; it says nothing about the views.
+# Other tables in the files of scenes and of sensors; they have no properties of the views.
 OTHER_TABLES = (
     "size_px", "seed", "camera", "surface", "contact", "light", "background", "optics", "sensor", "damage", "inks",
     "sequence", "name", "description", "source", "patterns", "elastomer", "response", "load", "conditions",
@@ -72,11 +72,11 @@ class Rig:
         for name in names:
             if names.count(name) > 1:
                 raise RigError(
-                    f"the view's name {name!r} is given {names.count(name)} times; give each its own"
+                    f"the view's name {name!r} is given {names.count(name)} times; give each view a different name"
                 )
 
     def without_poses(self) -> Rig:
-        """The same views without poses, which a rest frame gives; ``mirrored`` is kept."""
+        """The same views without poses, which follow from a rest frame; ``mirrored`` is kept."""
         poseless = {"R_camera_from_layout": None, "t_camera_from_layout_mm": None}
         return Rig(tuple(replace(view, **poseless) for view in self.views))  # type: ignore[arg-type]
 

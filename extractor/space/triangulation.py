@@ -19,10 +19,10 @@ from extractor.space.camera import Array, View, is_covariance, is_finite
 
 ITERATIONS = 12
 CONVERGED = 1e-5  # last step, in standard deviations
-GATE_SIGMAS = 6.0  # misfit above which a point is not reported
-TOLERANCE_PX = 0.1  # error beyond the covariance where gridlines bend more than extraction can follow
+GATE_SIGMAS = 6.0  # misfit above which a point is not reported; chosen
+TOLERANCE_PX = 0.1  # error beyond the covariance where gridlines bend more than extraction can follow; chosen
 MIN_EIGENVALUE = 1e-13  # of an information matrix with a unit diagonal, for an inverse
-INFLATION_SIGMAS = 3.0  # misfit above which a point's covariance is inflated
+INFLATION_SIGMAS = 3.0  # misfit above which a point's covariance is inflated; chosen
 MIN_RAY_DIVERGENCE = 1e-14  # half the squared angle between two rays, below which they are parallel
 LARGE_RESIDUAL_PX = 1e6  # residual of a point without a picture, so that a step there is refused
 MIN_DAMPING = 1e-3  # after a refused step

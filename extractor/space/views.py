@@ -1,4 +1,4 @@
-"""Several views in one image, as behind a pair of mirrors, or one image for each view: each is read by itself."""
+"""Several views in one image, as behind a pair of mirrors, or one image for each view: each view is read separately."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _images_by_view(image: Image | Sequence[Image | None] | None, rig: Rig) -> l
 
 
 def _side_shown(layout: Reference, view: View, side: Side) -> Side:
-    """The side that a view's picture seems to show, for an ``Extractor``: by its pose, else by side and mirrors."""
+    """The apparent side of a view's picture, for an ``Extractor``: by its pose, else by side and mirrors."""
     expected = is_mirrored(layout, side)
     if expected is None:
         return "either"
@@ -77,8 +77,8 @@ class ViewExtractor:
         layout: a triangular pattern, as for ``Extractor``.
         rig: the views.
         preset, response, channels: see ``Extractor``.
-        side: the side of the pattern at which the views look, directly or through mirrors; see ``Extractor``. A view's
-            pose, where the rig has it, says so instead. "either": pictures of both sides are read.
+        side: the side of the pattern that the views see, directly or through mirrors; see ``Extractor``. A view's
+            pose in the rig has priority. "either": pictures of both sides are read.
 
     Raises:
         LayoutError: the layout is not a triangular pattern.
@@ -127,7 +127,7 @@ class ShapeFrame:
         index: place in the sequence, from 0.
         time_s: time stamp in seconds; NaN where none was given.
         status: ``TRACKED`` when at least one marker has a position.
-        reason: why not, or which view shows nothing; empty when all views show the pattern.
+        reason: why not, or the view without a pattern; empty when all views show the pattern.
         shape: the surface.
         views: the tracked frame of every view.
         elapsed_ms: time from images to surface.
@@ -143,14 +143,14 @@ class ShapeFrame:
 
 
 class ShapeTracker:
-    """Follows the surface through a sequence; a frame that cannot be read says so and keeps its place.
+    """Follows the surface through a sequence; a frame that cannot be read has a reason and keeps its place.
 
-    A copy goes on as the original does.
+    A copy continues like the original.
 
     Args:
         reconstructor: with the poses of the views.
-        warm: start from the frame before where the image proves the prediction.
-        preset, response, channels: see ``Extractor``. The views' poses say which side each of them shows.
+        warm: start from the previous frame where the image proves the prediction.
+        preset, response, channels: see ``Extractor``. The views' poses determine the side that each view shows.
 
     Raises:
         ValueError: no such preset, response or order of channels.
@@ -180,7 +180,7 @@ class ShapeTracker:
         """Read the next frame.
 
         Args:
-            image: one image for all views or one for each; None where no image could be had, for ``reason``.
+            image: one image for all views or one for each view; None without an image, for ``reason``.
             time_s: time stamp of the frame.
         """
         started = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Tracking: every frame is numbered by itself; the frame before only saves time.
+"""Tracking: every frame is numbered independently; the previous frame only saves time.
 
 In: images of one size. Out: a ``Tracked`` for each, with displacements against the rest frame.
 """

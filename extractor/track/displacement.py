@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from extractor.layout.reference import Reference
 from extractor.numeric.homographies import mapped
 
-MIN_MARKERS = 4  # for a homography
-MAX_CONDITION = 1e6  # of the markers' scatter; collinear markers determine no homography
+MIN_MARKERS = 4  # for a homography; derived: eight parameters
+MAX_CONDITION = 1e6  # of the markers' scatter; collinear markers determine no homography. Chosen
 
 Points = NDArray[np.float64]
 

@@ -18,15 +18,17 @@ class CheckLimits(NamedTuple):
     """Limits of the check.
 
     Attributes:
-        min_white_ratio: of the white cell's brightness (sum of the channels) to an ink's; black is below.
-        min_cosine: between an ink level over black and the same cell's a frame ago, of a confirmed cell.
+        min_white_ratio: of the white cell's brightness (sum of the channels) to an ink's; black is below. Derived: as
+            in ``WhiteSearchLimits``.
+        min_cosine: between an ink level over black and the same cell's a frame ago, of a confirmed cell. Chosen.
         min_strength, max_strength: of the ink level over black of a confirmed cell, relative to the same cell's a frame
-            ago.
+            ago. Chosen.
         inner_sample_position: of the second samples of the ink, as a share of the way from the middle to a corner.
-        min_inner_strength: of the ink level at these samples, relative to the middle; across an edge to a black cell
-            it must be less.
-        level_radius: of the disc over which the ink is averaged, relative to the distance of a corner.
-        smallest_square: of ink levels, to divide by.
+            Chosen.
+        min_inner_strength: of the ink level at these samples, relative to the middle; across an edge to a black cell it
+            must be less. Chosen.
+        level_radius: of the disc over which the ink is averaged, relative to the distance of a corner. Chosen.
+        smallest_square: of ink levels, to divide by. Derived: it only keeps a division from failing.
     """
 
     min_white_ratio: float = 0.75
@@ -67,12 +69,12 @@ def check_cells(
     tables: WarmTables,
     levels_before: NDArray[np.float64] | None,
 ) -> CellCheck:
-    """Compare predicted cells with the image, and their inks with those in the frame before.
+    """Compare predicted cells with the image, and their inks with those in the previous frame.
 
     Args:
         image: (H, W, 3) uint8 BGR.
         corner_px: (C, 3, 2) predicted corners, NaN where not predicted.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before; None: inks are not compared.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame; None: inks are not compared.
     """
     compare = levels_before is not None
     before = np.zeros((len(tables.ink), 3)) if levels_before is None else levels_before[0]

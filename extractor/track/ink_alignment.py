@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 from extractor._native import track as native
 from extractor.track.warm_tables import WarmTables
 
-LARGE_SHIFT = 0.2  # in edges; after a larger shift the window is moved and the shift measured again
-RESTING_SHIFT = 0.02  # of a cell from the frame before, in edges, up to which the cell rests
+LARGE_SHIFT = 0.2  # in edges; after a larger shift the window is moved and the shift measured again. Chosen
+RESTING_SHIFT = 0.02  # of a cell from the frame before, in edges, up to which the cell rests; chosen
 
 
 class AlignmentLimits(NamedTuple):
     """Limits of the alignment.
 
     Attributes:
-        search_radius: of the window around a cell's middle, in edges.
-        min_rows: of pixels that are sampled in the window, at least.
-        min_pixel_ink: of an ink, for a pixel to count as this ink.
-        min_ink_share: of a cell's area that must show its ink in the window.
-        max_shift: of a cell from its prediction, in edges; beyond it the cell's shift is unknown.
+        search_radius: of the window around a cell's middle, in edges. Chosen.
+        min_rows: of pixels that are sampled in the window, at least. Chosen.
+        min_pixel_ink: of an ink, for a pixel to count as this ink. Chosen.
+        min_ink_share: of a cell's area that must show its ink in the window. Chosen.
+        max_shift: of a cell from its prediction, in edges; beyond it the cell's shift is unknown. Chosen.
         max_spread: of the shifts of cells that share a marker, from their mean, in edges; beyond it the marker is
-            unknown.
-        min_volume: sine of the angle of an ink to the plane of the two others, for unmixing.
-        min_area_px: px^2, of the parallelogram of the window's unit axes; smaller cells have no shift.
+            unknown. Chosen.
+        min_volume: sine of the angle of an ink to the plane of the two others, for unmixing. Chosen.
+        min_area_px: px^2, of the parallelogram of the window's unit axes; smaller cells have no shift. Chosen.
     """
 
     search_radius: float = 0.9
@@ -63,16 +63,16 @@ def align_to_inks(
     levels_before: NDArray[np.float64],
     shift_before: NDArray[np.float64],
 ) -> AlignedMarkers:
-    """The markers moved to where the inks of their cells are, in at most two passes.
+    """The markers moved to the places of their cells' inks, in at most two passes.
 
-    Blur, encoding and the choice of pixels shift centroids by a tenth of a pixel, alike in frames that are alike. So
-    the shift of a cell that rests is the difference from what the frame before showed at its own markers.
+    Blur, encoding and the choice of pixels shift centroids by a tenth of a pixel, equally in equal frames. Therefore
+    the shift of a cell that rests is the difference from the shift in the previous frame at its own markers.
 
     Args:
         image: (H, W, 3) uint8 BGR.
         predicted_px: (M, 2), NaN where not predicted.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
-        shift_before: (C, 2) px, ``resting_shifts`` of the frame before.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame.
+        shift_before: (C, 2) px, ``resting_shifts`` of the previous frame.
     """
     for _ in range(2):
         shift = _measure_shifts(image, predicted_px, tables, levels_before)

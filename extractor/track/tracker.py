@@ -1,4 +1,4 @@
-"""Tracking: every frame is numbered by itself, so that nothing drifts; the frame before only saves time."""
+"""Tracking: every frame is numbered independently, so that there is no drift; the previous frame only saves time."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ from extractor.track.ink_alignment import resting_shifts
 from extractor.track.warm_start import WarmStart, select_prediction, verify_prediction
 from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_missing_markers
 
-MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a cold start may find more
-WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice
-EDGE_SAMPLING_STEP = 8  # one of this number of edges is measured for the choice of that scale
-COLD_START_INTERVAL = 200  # frames after which a cold start is done
+MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a cold start may find more. Chosen
+WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice; chosen
+# one of this number of edges is measured for the choice of that scale; chosen, for time
+EDGE_SAMPLING_STEP = 8
+COLD_START_INTERVAL = 200  # frames after which a cold start is done; chosen
 # Warm passes over the image of a cold start. Warm frames start from levels and blur of the frame before: without these
 # passes, equal frames after a cold start differ from it by 0.18 stated standard deviations (median), with two by 0.04.
 SETTLING_PASSES = 2
@@ -39,7 +40,7 @@ class FrameStatus(IntEnum):
     """The outcome of a frame; every frame has one."""
 
     TRACKED = 1
-    LOST = 2  # read, but the pattern was not found; ``reason`` says why
+    LOST = 2  # read, but the pattern was not found; ``reason`` states the cause
     UNREADABLE = 3  # no image
     OTHER_SIZE = 4  # not of the first frame's size
 
@@ -47,8 +48,8 @@ class FrameStatus(IntEnum):
 class StartKind(StrEnum):
     """How a frame's numbering was found."""
 
-    COLD = "cold"  # without the frame before
-    WARM = "warm"  # predicted from the frame before, proved by the white cell
+    COLD = "cold"  # without the previous frame
+    WARM = "warm"  # predicted from the previous frame, proved by the white cell
     RIM = "warm, by the rim"  # predicted, proved by the pattern's whole rim, as the white cell is hidden
 
 
@@ -61,7 +62,7 @@ class Tracked:
         time_s: time stamp in seconds; NaN where none was given.
         status: outcome of the frame.
         reason: why the frame is not tracked, or why few of its markers are found; else empty.
-        start: how the numbering was found; None where there is none.
+        start: how the numbering was found; None without a numbering.
         markers: the markers, all lost where the frame is not tracked.
         displacement_px: (M, 2) float64 from the rest frame in the image frame (x right, y down), NaN where unknown.
         displacement_mm: (M, 2) float64 in the layout frame (y up), NaN where unknown; see ``Rest``.
@@ -85,12 +86,12 @@ class Tracked:
 
 @dataclass(frozen=True, eq=False)
 class _TrackState:
-    """The last tracked frame, from which the next one is predicted.
+    """The last tracked frame, from which the next frame is predicted.
 
     Attributes:
         xy_px: (M, 2) float64, NaN where lost.
         known: (M,) bool, the measured markers.
-        previous_px: (M, 2) float64, the markers of the frame before; None where this was lost.
+        previous_px: (M, 2) float64, the markers of the previous frame; None where that frame was lost.
         cell_levels: (2, C, 3) float64, see ``CellCheck``; complete.
         cell_shift_px: (C, 2) float64, px at the scale of the next check, see ``resting_shifts``.
         appearance: of the image, for refinement; None where the pattern was not drawn.
@@ -113,7 +114,7 @@ class _TrackState:
 
 
 class Tracker:
-    """Follows one pattern through a sequence of images of one size. A copy goes on as the original does.
+    """Follows one pattern through a sequence of images of one size. A copy continues like the original.
 
     >>> from extractor import Tracker
     >>> tracker = Tracker("layout.json")  # doctest: +SKIP
@@ -124,7 +125,7 @@ class Tracker:
         rest: markers at rest; None: the first tracked frame.
         mm_per_px: a scale for millimetres along the image's axes; None: millimetres in the layout frame, by a
             homography fitted at rest.
-        warm: start from the frame before where the image proves the prediction; False: always cold. Ids are the same.
+        warm: start from the previous frame where the image proves the prediction; False: always cold. Ids are the same.
         preset, response, side, channels: see ``Extractor``.
 
     Raises:
@@ -157,10 +158,10 @@ class Tracker:
             self.rest = fit_rest(rest.xy_px, layout, mm_per_px)
 
     def track(self, image: NDArray[Any] | None, *, time_s: float = float("nan"), reason: str = "") -> Tracked:
-        """Read the next frame; a frame that cannot be tracked says so and keeps its place in the sequence.
+        """Read the next frame; a frame that cannot be tracked has a reason and keeps its place in the sequence.
 
         Args:
-            image: as for ``Extractor.extract``; None where no image could be had, for ``reason``.
+            image: as for ``Extractor.extract``; None without an image, for ``reason``.
             time_s: time stamp of the frame.
         """
         started = time.perf_counter()
@@ -184,7 +185,7 @@ class Tracker:
         return self._make_tracked(time_s, status, reason, start, markers, elapsed_ms)
 
     def _read(self, image: NDArray[Any]) -> tuple[Markers, StartKind | None]:
-        """The markers of an image by a warm or a cold start, and which one it was; None where nothing was found."""
+        """The markers of an image by a warm or a cold start, and the kind of start; None without markers."""
         warm = self._try_warm_start(image)
         if warm is not None:
             return warm
@@ -207,7 +208,7 @@ class Tracker:
 
     def _settle(self, image: NDArray[Any], markers: Markers) -> Markers:
         """The markers of a cold start after warm passes over the same image, so that equal frames agree; the markers
-        as they are where the image does not prove them. The state keeps the motion from the frame before."""
+        as they are where the image does not prove them. The state keeps the motion from the previous frame."""
         cold = self._state
         for _ in range(SETTLING_PASSES):
             warm = self._try_warm_start(image)

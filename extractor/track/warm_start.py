@@ -1,11 +1,11 @@
-"""The warm start: a frame's numbering is predicted from the frame before, and proved by the image.
+"""The warm start: a frame's numbering is predicted from the previous frame, and proved by the image.
 
-The frame before is no evidence. Every cell must show its own ink inside and none of it across its edges, and must be
-connected to the white cell (or to the whole rim of the pattern) over cells that do the same. A triangle that is off by
-more than a seventh of an edge fails, so where two of them share a corner the real cells do so, too. Around a real
-corner red, green and blue turn clockwise, so a chain of such cells from the white cell has the numbering of a cold
-start. Frames that fail are left to the cold start. The frame before thus saves time and decides nothing, except while
-the white cell is hidden and the whole rim is visible.
+The previous frame is no evidence. Every cell must show its own ink inside and none of it across its edges, and must be
+connected to the white cell (or to the whole rim of the pattern) over cells that pass the same test. A triangle that is
+off by more than a seventh of an edge fails. Therefore, where two passing triangles share a corner, the real cells share
+it, too. Around a real corner red, green and blue turn clockwise, so a chain of such cells from the white cell has the
+numbering of a cold start. Frames that fail have a cold start. The previous frame thus saves time and does not determine
+the numbering, except while the white cell is hidden and the whole rim is visible.
 """
 
 from __future__ import annotations
@@ -23,17 +23,20 @@ from extractor.track.image_check import CONFIRMED, check_cells
 from extractor.track.ink_alignment import align_to_inks
 from extractor.track.warm_tables import WarmTables
 
-MIN_PREDICTED = 0.8  # of the cells in view whose middles must show their ink under a predicted position
-MIN_WHITE_EDGES = 2  # of a cell's three edges across which it is bright, for the white cell and for a rival
+# of the cells in view whose middles must show their ink under a predicted position; chosen
+MIN_PREDICTED = 0.8
+# of a cell's three edges across which it is bright, for the white cell and for a rival; chosen
+MIN_WHITE_EDGES = 2
 
 
 class WarmStartLimits(NamedTuple):
     """Limits of the proof.
 
     Attributes:
-        center_radius_px: of the disc over which a middle's color is averaged.
+        center_radius_px: of the disc over which a middle's color is averaged. Chosen.
         min_center_strength: of a middle's ink level, relative to the frame before, for the middle to show its ink.
-        min_verified_share: of the cells in view that the image must confirm.
+            Chosen.
+        min_verified_share: of the cells in view that the image must confirm. Chosen.
     """
 
     center_radius_px: float = 0.5
@@ -50,7 +53,7 @@ class WarmStart:
 
     Attributes:
         places: the markers before refinement.
-        cell_levels: (2, C, 3) as in ``CellCheck``; of cells that are not proved, those of the frame before.
+        cell_levels: (2, C, 3) as in ``CellCheck``; of cells that are not proved, the levels of the previous frame.
         by_rim: the white cell is hidden, and the rim proved the numbering.
     """
 
@@ -78,12 +81,12 @@ def select_prediction(
     tables: WarmTables,
     levels_before: NDArray[np.float64],
 ) -> NDArray[np.float64] | None:
-    """The candidate under which the most cells show their ink in their middle; None when too few do.
+    """The candidate with the most cells that show their ink in their middle; None with too few cells.
 
     Args:
         image: (H, W, 3) uint8 BGR.
         candidates: (M, 2) predicted markers each, px.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame.
     """
     best, best_share = None, MIN_PREDICTED
     for candidate in candidates:
@@ -105,14 +108,14 @@ def verify_prediction(
     levels_before: NDArray[np.float64],
     shift_before: NDArray[np.float64],
 ) -> WarmStart | None:
-    """Move the predicted cells onto the image; None unless the image confirms enough of them.
+    """Move the predicted cells onto the image; None unless the image confirms enough cells.
 
     Args:
         level: the image at the scale of the check.
         predicted_px: (M, 2) in this level, NaN where not predicted.
-        known: (M,) bool, markers of the frame before; nearly all of their cells in view must be confirmed.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the frame before.
-        shift_before: (C, 2) px in this level, ``resting_shifts`` of the frame before.
+        known: (M,) bool, markers of the previous frame; nearly all of their cells in view must be confirmed.
+        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame.
+        shift_before: (C, 2) px in this level, ``resting_shifts`` of the previous frame.
     """
     aligned = align_to_inks(level.image, predicted_px, tables, levels_before, shift_before)
     check = check_cells(level.image, aligned.xy_px[tables.corners], tables, levels_before)
@@ -133,7 +136,6 @@ def verify_prediction(
     places = InitialMarkers(
         level.to_full_scale(verified.xy_px),
         aligned.edge_px * level.scale,
-        tables.corners[proved],
         *agreement,
     )
     return WarmStart(places, np.where(proved[:, None], check.cell_levels, levels_before), by_rim)

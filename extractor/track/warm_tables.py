@@ -112,7 +112,7 @@ def _nearest_by_ink(center_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> N
 
 
 def predict_missing_markers(tables: WarmTables, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The markers (M, 2) px; those that are NaN are predicted from known cells across one of their edges.
+    """The markers (M, 2) px; NaN markers are predicted from known cells across one of their edges.
 
     A marker that several cells predict is placed at the mean of these places.
     """

@@ -1,4 +1,6 @@
-"""The trial of rules: their texts, copies of the reader without them, what a trial measures, and which rules stay."""
+"""The ablation of rules: their source texts, copies of the reader without a rule, the measured figures, and the
+decision.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,7 @@ NATIVE_READING = Rule(
 
 def score(**fields: float) -> PictureScore:
     usual = {"wrong_ids": 0, "wrong_positions": 0, "lost": 0, "visible": 400, "measured": 400}
-    sums = {"squared_px2": 400 * 2 * 0.03**2, "reported": 400, "d2": 800.0, "ms": 50.0}
+    sums = {"squared_px2": 400 * 2 * 0.03**2, "reported": 400, "d2": 800.0, "beyond": 1, "ms": 50.0}
     return PictureScore(**{**usual, **sums, **fields})  # type: ignore[arg-type]
 
 
@@ -61,7 +63,7 @@ def test_a_rules_text_occurs_once_and_leaves_a_file_without_it(rule: Rule) -> No
 
 def test_rules_are_told_apart_by_name() -> None:
     assert len({rule.name for rule in RULES}) == len(RULES)
-    assert {rule.kind for rule in RULES} == {"accuracy", "no wrong id"}
+    assert {rule.kind for rule in RULES} == {"accuracy", "errors and time", "no wrong id"}
     assert {rule.stage for rule in RULES} == {
         *("pipeline", "image", "cells", "numbering", "localmap", "refine", "complete")
     }
@@ -162,6 +164,14 @@ def test_a_rule_against_wrong_ids_stays_if_it_saves_one_and_costs_fewer() -> Non
     assert compare(rule, full, one).verdict == "keep" and compare(rule, one, full).verdict == "goes"
     assert compare(rule, full, [score(lost=50) for _ in full]).verdict == "keep"
     assert compare(rule_of("accuracy"), full, one).verdict == "keep"
+
+
+@pytest.mark.parametrize("worse", [{"d2": 900.0}, {"d2": 700.0}, {"beyond": 2}, {"ms": 52.0}])
+def test_a_rule_for_true_errors_or_time_stays_if_z_or_time_are_worse(worse: dict[str, float]) -> None:
+    full, without = [score() for _ in range(30)], [score(**worse) for _ in range(30)]
+    assert compare(rule_of("errors and time"), full, without).verdict == "keep"
+    assert compare(rule_of("accuracy"), full, without).verdict == "goes"
+    assert compare(rule_of("errors and time"), full, [score(ms=40.0, d2=790.0)] * 30).verdict == "goes"
 
 
 def test_wrong_ids_and_wrong_positions_are_counted_apart() -> None:

@@ -86,7 +86,7 @@ def test_every_effect_changes_the_picture_by_its_strength(name: str) -> None:
 
 
 def test_distortion_moves_the_truth_and_the_picture_alike() -> None:
-    """A drawn marker lies at its true place: the reader finds it there, in a picture with much distortion."""
+    """A drawn marker has its true position: the reader finds this position in a picture with much distortion."""
     pose = Pose(pitch_px=22.0)
     straight = shoot(Chain(pose=pose)).marker_xy_px
     middle = np.array([(SIZE_PX[0] - 1) / 2, (SIZE_PX[1] - 1) / 2])
@@ -118,7 +118,9 @@ def test_chromatic_aberration_magnifies_red_and_shrinks_blue() -> None:
 
 
 def test_kernels_move_no_edge() -> None:
-    """Centred, of unit sum, and as wide as they say; pixels that share a point add a sixth of a square pixel."""
+    """Kernels are centred, have the sum 1 and the stated width; pixels that share a point add a sixth of a square
+    pixel.
+    """
     for kernel, variance in (
         (line_kernel(9.0, 30.0), 81 / 12 + 1 / 3),
         (disc_kernel(3.0), 9 / 2 + 1 / 3),
@@ -154,7 +156,9 @@ def test_demosaicing_keeps_flat_colors(method: Demosaicing, phase: int) -> None:
 
 
 def test_jpeg_halves_the_colors_where_it_says_so() -> None:
-    """Fine lines of red and blue of one luminance: full resolution keeps them, half resolution mixes them."""
+    """Fine lines of red and blue of one luminance: full resolution preserves the lines, half resolution mixes their
+    colors.
+    """
     image = np.zeros((64, 64, 3), np.uint8)
     image[:, ::2], image[:, 1::2] = (0, 0, 150), (255, 35, 0)
     full, half = (compressed(image, 95, chroma_420=chroma).astype(int) - image for chroma in (False, True))

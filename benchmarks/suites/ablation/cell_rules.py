@@ -15,7 +15,7 @@ PIPELINE = (
     ),
     Rule(
         "attach",
-        "detached cells numbered by contact or prediction, inconsistent ones dropped",
+        "detached cells are numbered by contact or prediction, inconsistent cells are dropped",
         "accuracy",
         "extractor/pipeline.py",
         "if numbering.doubt is None:",
@@ -50,7 +50,7 @@ IMAGE = (
     ),
     Rule(
         "pale pixels",
-        "pale pixels do not vote for the inks' hues",
+        "pale pixels are excluded from the inks' hues",
         "accuracy",
         "extractor/image/color.py",
         "strong_quantile: float = 0.98",
@@ -77,7 +77,7 @@ IMAGE = (
 CELLS = (
     Rule(
         "clutter",
-        "of too many domains only solid ones are kept",
+        "of too many domains only solid domains are kept",
         "accuracy",
         "extractor/cells/seeds.py",
         "native.find_domains(runs, parent, max_domains, LIMITS)",

@@ -1,4 +1,6 @@
-"""A rule's worth: paired differences between the reader without the rule and the full one, over the same pictures."""
+"""A rule's effect: paired differences between the reader without the rule and the full reader, over the same
+pictures.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.trial import PictureScore
 
-LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that stays
+LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that is kept
 RESAMPLES, SEED = 2000, 20250101
 INTERVAL_PERCENT = (2.5, 97.5)
 Verdict = Literal["keep", "goes"]
@@ -43,17 +45,20 @@ class Change(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What a rule is worth.
+    """The effect of a rule.
 
     Attributes:
         rule: the rule that was switched off.
-        pictures: how many were read; ``touched`` of them came out differently.
+        pictures: number of pictures; ``touched`` is the number with a different result.
         wrong_ids, wrong_positions: summed.
         ids_saved: wrong ids that only the reader without the rule reports; ``ids_cost``: that only the full one does.
         wrong, lost: the counts that are judged.
         rms_px: of all measured markers together, which gross errors and poor pictures rule.
         typical_px: the geometric mean of the pictures' RMS, in which every picture counts the same.
-        z: sqrt(mean d2 / 2) of all reported markers that are not wrong, with and without; not judged.
+        z: sqrt(mean d2 / 2) of all reported markers that are not wrong, with and without.
+        departure: of z from 1, the larger one of z and 1 / z.
+        beyond: share of these markers with d2 above ``BEYOND_D2``.
+        ms: processor time, summed.
         time_ratio: median over pictures of the processor time without the rule over that with it.
     """
 
@@ -69,16 +74,22 @@ class Comparison(NamedTuple):
     rms_px: Change
     typical_px: Change
     z: tuple[float, float]
+    departure: Change
+    beyond: Change
+    ms: Change
     time_ratio: float
 
     @property
     def judged(self) -> tuple[Change, ...]:
-        """The figures by which a rule is judged, besides the ids that it saves."""
-        return (self.wrong, self.lost, self.rms_px, self.typical_px)
+        """The figures by which a rule of its kind is judged, besides the ids that it saves."""
+        usual = (self.wrong, self.lost, self.rms_px, self.typical_px)
+        return (
+            (*usual, self.departure, self.beyond, self.ms) if self.rule.kind == "errors and time" else usual
+        )
 
     @property
     def verdict(self) -> Verdict:
-        """A rule stays that saves more ids than it costs, or without which wrong, lost or RMS are worse."""
+        """A rule stays that saves more ids than it costs, or without which a figure that is judged is worse."""
         saves_ids = self.ids_saved > self.ids_cost
         return "keep" if saves_ids or any(change.is_worse for change in self.judged) else "goes"
 
@@ -101,6 +112,9 @@ def compare(rule: Rule, full: Sequence[PictureScore], without: Sequence[PictureS
         rms_px=_change(full, without, lambda score: (score.squared_px2, 2.0 * score.measured), _root),
         typical_px=_change(*_columns(both), _log_of_rms, _exponential),
         z=(_z(full), _z(without)),
+        departure=_change(full, without, lambda score: (score.d2, 2.0 * score.reported), _departure),
+        beyond=_change(full, without, lambda score: (score.beyond, score.reported), _ratio),
+        ms=_change(full, without, lambda score: (np.nan_to_num(score.ms), 0.0), _total),
         time_ratio=float(np.median(ratios)) if ratios else math.nan,
     )
 
@@ -140,7 +154,7 @@ def _log_of_rms(score: PictureScore) -> tuple[float, float]:
 
 
 def _exponential(sums: Floats) -> Floats:
-    """The exponential of the mean: the first sums (N, 2) over the second ones."""
+    """The exponential of the mean: the first sums (N, 2) over the second sums."""
     return np.asarray(np.exp(sums[:, 0] / sums[:, 1]))
 
 
@@ -148,8 +162,19 @@ def _total(sums: Floats) -> Floats:
     return sums[:, 0]
 
 
-def _root(sums: Floats) -> Floats:
-    """The root of the first sums (N, 2) over the second ones; NaN where nothing was measured."""
+def _ratio(sums: Floats) -> Floats:
+    """The first sums (N, 2) over the second ones; NaN where nothing was measured."""
     out = np.full(len(sums), np.nan)
     np.divide(sums[:, 0], sums[:, 1], out=out, where=sums[:, 1] > 0)
-    return np.asarray(np.sqrt(out))
+    return out
+
+
+def _root(sums: Floats) -> Floats:
+    return np.asarray(np.sqrt(_ratio(sums)))
+
+
+def _departure(sums: Floats) -> Floats:
+    """Of the root of that ratio from 1, as a ratio of at least 1."""
+    root = _root(sums)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.maximum(root, 1.0 / root))

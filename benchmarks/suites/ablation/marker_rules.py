@@ -21,45 +21,13 @@ PLACES = (
         "max_corner_misfit: float = 0.28",
         "max_corner_misfit: float = np.inf",
     ),
-    Rule(
-        "corner spread",
-        "a marker whose triangles disagree is lost",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "max_corner_spread: float = 0.3",
-        "max_corner_spread: float = np.inf",
-    ),
-    Rule(
-        "damaged cells",
-        "where most cells have triangles, the edges of one without are not drawn",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "min_sharp_share: float = 0.6",
-        "min_sharp_share: float = 1.0",
-    ),
-    Rule(
-        "cut cells",
-        "cells that the image's border cuts off are drawn without a triangle",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "border_px: float = 3.0",
-        "border_px: float = -np.inf",
-    ),
-    Rule(
-        "unmatched rim",
-        "a rejected triangle at the rim gives a corner that the neighbouring markers predict",
-        "accuracy",
-        "extractor/numbering/marker_places.py",
-        "unmatched = merged.is_unmatched & lattice.is_rim",
-        "unmatched = merged.is_unmatched & False",
-    ),
 )
 
 REFINEMENT = (
     Rule(
         "last step",
         "the last of a preset's steps by synthesis, where markers still move",
-        "accuracy",
+        "errors and time",
         "extractor/refine/refiner.py",
         "self._synthesis_solver.steps(view, start, schedule, usual_px)",
         "self._synthesis_solver.steps(view, start, schedule._replace(steps=schedule.steps - 1), usual_px)",
@@ -67,7 +35,7 @@ REFINEMENT = (
     Rule(
         "small move",
         "no step follows one that hardly moved the markers",
-        "accuracy",
+        "errors and time",
         "extractor/refine/synthesis_steps.py",
         "typical_move(shift, estimate.information) < schedule.small_move",
         "typical_move(shift, estimate.information) < 0.0",
@@ -75,7 +43,7 @@ REFINEMENT = (
     Rule(
         "settled appearance",
         "a step follows while blur or dot gain still change",
-        "accuracy",
+        "errors and time",
         "extractor/refine/synthesis_steps.py",
         "if judged and is_settled and",
         "if judged and",
@@ -83,7 +51,7 @@ REFINEMENT = (
     Rule(
         "scatter",
         "where markers lie by themselves off the smooth map, gridlines do not curve as its tangents say",
-        "accuracy",
+        "errors and time",
         "extractor/refine/measure/marker_scatter.py",
         "return MarkerScatter(*found)",
         "return NO_SCATTER",
@@ -91,7 +59,7 @@ REFINEMENT = (
     Rule(
         "scatter of profiles",
         "what profiles leave is not taken for scatter",
-        "accuracy",
+        "errors and time",
         "extractor/refine/measure/marker_scatter.py",
         "start_allowance: float = 100.0",
         "start_allowance: float = 2.0",
@@ -125,7 +93,7 @@ COMPLETE = (
     ),
     Rule(
         "agreed unexplained",
-        "the tolerance is slightly narrower where triangles agree and synthesis explains nothing",
+        "the tolerance is slightly narrower where triangles agree and synthesis does not explain the image",
         "accuracy",
         "extractor/native/complete/consistency_filter.cpp",
         "allowed = limits.max_agreed_unexplained_distance;",
@@ -149,7 +117,7 @@ COMPLETE = (
     ),
     Rule(
         "repair by uncertain",
-        "lost markers are predicted from uncertain ones, too",
+        "lost markers are predicted from uncertain markers, too",
         "accuracy",
         "extractor/native/complete/repair.cpp",
         "if (is_any(lost_) && is_any(Flags(markers_.uncertain))) {",
@@ -164,14 +132,6 @@ COMPLETE = (
         "max_implied_distance: float = 0.0",
     ),
     Rule(
-        "repair by cubic",
-        "a lost marker in nearly whole rings is repaired on a bent surface",
-        "accuracy",
-        "extractor/complete/repair.py",
-        "cubic_error: float = 1.6",
-        "cubic_error: float = np.inf",
-    ),
-    Rule(
         "repair by layer",
         "a lost marker is fitted on the quadratic of its layer and sextant",
         "accuracy",
@@ -181,18 +141,10 @@ COMPLETE = (
     ),
     Rule(
         "fusion",
-        "an uncertain marker is fused with the prediction by its rings",
+        "an uncertain marker is combined with the prediction by its rings",
         "accuracy",
         "extractor/native/complete/repair.cpp",
         "else if (variance >= 0.0) {",
         "else if (false) {",
-    ),
-    Rule(
-        "inner ring",
-        "a repair is refused where the inner ring alone predicts another place",
-        "accuracy",
-        "extractor/native/complete/repair.cpp",
-        "unconfirmed ? ring_error : (dx * dx + dy * dy) / 4;",
-        "unconfirmed ? 0.0 : 0.0 * (dx + dy);",
     ),
 )

@@ -1,4 +1,4 @@
-"""The rules of the numbering, and of the cells that stand apart."""
+"""The rules of the numbering, and of detached cells."""
 
 from __future__ import annotations
 
@@ -20,22 +20,6 @@ NUMBERING = (
         "extractor/numbering/lattice_walk.py",
         "return max(of_layout, min(MIN_MESH_SHARE * meshed, SUFFICIENT_CELLS))",
         "return of_layout",
-    ),
-    Rule(
-        "relative whiteness",
-        "places less white than the whitest are no white cells",
-        "no wrong id",
-        "extractor/numbering/lattice_walk.py",
-        "found = [one for one in found if one.white >= white]",
-        "",
-    ),
-    Rule(
-        "white beside",
-        "a white cell that touches walked cells goes before a farther one",
-        "no wrong id",
-        "extractor/numbering/lattice_walk.py",
-        "key=lambda one: (one.white_adjacent, one.score)",
-        "key=lambda one: one.score",
     ),
     Rule(
         "rivals",
@@ -63,7 +47,7 @@ NUMBERING = (
     ),
     Rule(
         "marker turn",
-        "markers are brighter than black cells, which tells the view's side",
+        "markers are brighter than black cells, which determines the view's side",
         "no wrong id",
         "extractor/numbering/mesh_parts.py",
         "return [front] if front != 0 else [1, -1]",
@@ -86,14 +70,6 @@ NUMBERING = (
         "min_black_share: float = 0.0",
     ),
     Rule(
-        "relative brightness",
-        "places less bright than the brightest are no white cells",
-        "no wrong id",
-        "extractor/numbering/white_search.py",
-        "if found.brightness[n] > MIN_RELATIVE_BRIGHTNESS * brightest",
-        "",
-    ),
-    Rule(
         "white triangle",
         "the white cell fills its triangle and ends with it",
         "no wrong id",
@@ -103,7 +79,7 @@ NUMBERING = (
     ),
     Rule(
         "between inks",
-        "the cells beside the white one show their inks",
+        "the cells beside the white cell show their inks",
         "no wrong id",
         "extractor/native/numbering/white_cell.cpp",
         "return is_white_triangle() && is_between_inks();",
@@ -111,7 +87,7 @@ NUMBERING = (
     ),
     Rule(
         "white centroid",
-        "the white cell is tried at the centroid of the white, too",
+        "the white cell is tried at the centroid of the white area, too",
         "accuracy",
         "extractor/numbering/white_cell.py",
         "max_centroid_distance: float = 0.3",
@@ -130,7 +106,7 @@ NUMBERING = (
 GAPS = (
     Rule(
         "touch",
-        "cells in contact with numbered ones are numbered",
+        "cells in contact with numbered cells are numbered",
         "accuracy",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "update_numbers_by_contact(contacts, triangles, new_cells, numbering)",
@@ -146,7 +122,7 @@ GAPS = (
     ),
     Rule(
         "unique claim",
-        "a cell of the layout that two cells claim is given to neither",
+        "a cell of the layout that two cells may be is assigned to neither",
         "no wrong id",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "assignments.candidate_count[place] != 1",
@@ -154,7 +130,7 @@ GAPS = (
     ),
     Rule(
         "nearest first",
-        "the cells nearest to numbered ones are numbered first",
+        "the cells nearest to numbered cells are numbered first",
         "no wrong id",
         "extractor/numbering/gaps/cell_claims.py",
         "joint_gap: float = 1.7",
@@ -169,6 +145,14 @@ GAPS = (
         "    state.is_consistent[i] = block[i] == reference || cell[i] >= 0;\n    selected[i] = false;\n",
     ),
     Rule(
+        "firm contacts",
+        "large blocks of cells are not joined by contacts that no third cell confirms",
+        "no wrong id",
+        "extractor/native/numbering/gaps/gap_check.cpp",
+        "blocks_of(neighbours, selected, limits)",
+        "connected_components(neighbours, selected)",
+    ),
+    Rule(
         "single cells",
         "single cells across a gap continue the pattern, too",
         "no wrong id",
@@ -178,7 +162,7 @@ GAPS = (
     ),
     Rule(
         "first check",
-        "cells are checked before detached ones are numbered, too",
+        "cells are also checked before detached cells are numbered",
         "no wrong id",
         "extractor/native/numbering/gaps/detached_cells.cpp",
         "out, consistent_cells(contacts, out, white_px, neighbours, limits.check), neighbours);",

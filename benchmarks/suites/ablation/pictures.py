@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -43,7 +43,7 @@ class KeptPicture(NamedTuple):
     """A picture on disk.
 
     Attributes:
-        suite, kind: of the picture.
+        suite, kind: suite and kind of the picture.
         path: the file that ``read_pictures`` of ``worker`` reads.
         truths: one entry for each pattern in the picture; none without a pattern.
     """
@@ -55,21 +55,23 @@ class KeptPicture(NamedTuple):
 
 
 def sampled_cases(suite: str, count: int, seed: int) -> list[CalibrationCase]:
-    """``count`` pictures of a suite, drawn from all of its pictures by the seed; all if it has fewer."""
+    """``count`` pictures of a suite, drawn from all of its pictures by the seed; all pictures if the suite has
+    fewer.
+    """
     if suite == PROVOKING:
         return list(islice(provoking_cases(seed), count))
     cases = list(suites_by_name()[suite](False, seed))
     if suite == "damage":
-        cases += random_damage_cases(seed)
+        cases += random_damage_cases(seed, RANDOM_DRAWS)
     chosen = np.random.default_rng([seed, 5]).permutation(len(cases))[:count]
     return [cases[number] for number in sorted(chosen)]
 
 
-def random_damage_cases(seed: int) -> list[CalibrationCase]:
-    """Damage of any color and size on deformed surfaces, all kinds and patterns."""
+def random_damage_cases(seed: int, draws: int) -> list[CalibrationCase]:
+    """Damage of any color and size on deformed surfaces, all kinds and patterns, as often as there are draws."""
     own = [
         StressCase(kind.name, kind.steps[0], pattern, (seed + 104729 * draw) % 2**31)
-        for draw in range(RANDOM_DRAWS)
+        for draw in range(draws)
         for kind in RANDOM_KINDS
         for pattern in PATTERNS
     ]
@@ -83,9 +85,16 @@ def random_damage_cases(seed: int) -> list[CalibrationCase]:
 
 def keep_pictures(suite: str, count: int, seed: int, folder: Path) -> Iterator[KeptPicture]:
     """Draw the pictures of a suite, one after another, into files of the folder."""
-    for number, case in enumerate(sampled_cases(suite, count, seed)):
+    yield from keep_cases(suite, sampled_cases(suite, count, seed), f"{suite}-{seed}", folder)
+
+
+def keep_cases(
+    suite: str, cases: Iterable[CalibrationCase], stem: str, folder: Path
+) -> Iterator[KeptPicture]:
+    """Draw cases, one after another, into files of the folder whose names begin with the stem."""
+    for number, case in enumerate(cases):
         shot = case.shoot()
-        path = folder / f"{suite}-{seed}-{number}.npz"
+        path = folder / f"{stem}-{number}.npz"
         np.savez(path, image=shot.image, layout=layout_to_json(case.layout))
         truths = tuple(
             pattern_truth(case.layout, truth.marker_xy_px, getattr(truth, "visible", None), shot.image.shape)

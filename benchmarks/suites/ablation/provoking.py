@@ -1,6 +1,6 @@
 """Pictures made to provoke wrong ids.
 
-Walks through damage, cells missing or swapped, several references, foreign tilings, and a very large pattern. Ten kinds
+Walks through damage, cells missing or swapped, several references, other tilings, and a very large pattern. Ten kinds
 follow each other; twenty pictures hold about a hundred thousand markers, half of them in large patterns.
 """
 
@@ -36,7 +36,7 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True, eq=False)
 class ForeignPicture:
-    """A picture of something that is not the reader's pattern: every marker reported in it has a wrong id."""
+    """A picture without the reader's pattern: every reported marker has a wrong id."""
 
     image: NDArray[np.uint8]
     truths: tuple[Truth, ...] = ()
@@ -73,13 +73,13 @@ def with_white_drop(frame: PatternFrame, rng: Rng) -> PatternFrame:
 
 
 def with_pads_beside(frame: PatternFrame, rng: Rng) -> PatternFrame:
-    """A second pad beside, of the same or another pattern."""
+    """A second pad beside the first, of the same or another pattern."""
     name = frame.layout.pattern if rng.random() < 0.5 else other_pattern_name(frame)
     return second_pattern_beside(frame, name, 12.0, mirrored=bool(rng.random() < 0.3))
 
 
 def before_a_tiling(frame: PatternFrame, rng: Rng) -> PatternFrame:
-    """A foreign tiling of about the same pitch behind, and cells missing at the rim."""
+    """Another tiling of about the same pitch as background, and cells missing at the rim."""
     behind = pattern_behind(frame.with_camera(pitch_px=12), float(rng.uniform(9, 16)))
     return behind.damaged(missing_share=float(rng.uniform(0, 0.15)))
 
@@ -128,7 +128,7 @@ FOREIGN = "foreign tiling"
 
 
 def shoot_foreign(seed: int, pattern: str) -> ForeignPicture:
-    """A tiling that is not the reader's pattern, or something else without a pattern."""
+    """A tiling that is not the reader's pattern, or a picture without a pattern."""
     rng = np.random.default_rng([seed, 6])
     kind = EMPTY_KINDS[int(rng.integers(len(EMPTY_KINDS)))]
     frame = kind.change(plain_frame(pattern, seed), float(rng.choice(kind.steps)))
@@ -137,7 +137,7 @@ def shoot_foreign(seed: int, pattern: str) -> ForeignPicture:
 
 
 def provoking_cases(seed: int) -> Iterator[CalibrationCase]:
-    """The kinds in turn, the patterns in turn, without an end."""
+    """The kinds in turn, the patterns in turn, endlessly."""
     kinds = (*CHANGES, FOREIGN)
     for number in count():
         kind, turn = kinds[number % len(kinds)], number // len(kinds)

@@ -1,7 +1,7 @@
 """A rule of the reader, with the text of its source that switches it off.
 
-A rule is a threshold, a branch or a fallback that the reader would work without. The text occurs exactly once in its
-file. A threshold is switched off in the limits of its Python module, which need no compiler. The stages themselves
+A rule is a threshold, a branch or a fallback without which the reader would still work. The text occurs exactly once in
+its file. A threshold is switched off in the limits of its Python module, which need no compiler. The stages themselves
 (inks, growing, mesh, walk) are no rules.
 """
 
@@ -12,16 +12,17 @@ from typing import Literal, NamedTuple
 
 from benchmarks.support.code_copy import Replacement
 
-Kind = Literal["accuracy", "no wrong id"]
+Kind = Literal["accuracy", "errors and time", "no wrong id"]
 
 
 class Rule(NamedTuple):
     """One rule.
 
     Attributes:
-        name: of the rule.
+        name: name of the rule.
         purpose: what the rule is for.
-        kind: by what it is judged: by counts and errors in the five suites, or by the wrong ids that it prevents.
+        kind: by what it is judged: by counts and errors in the five suites, by z and processor time, too, or by the
+            wrong ids that it prevents.
         file: of the reader's source, relative to the checkout.
         text: of the file, to be replaced.
         without: the text that replaces it and switches the rule off.
@@ -42,5 +43,5 @@ class Rule(NamedTuple):
 
     @property
     def change(self) -> Replacement:
-        """What switches the rule off."""
+        """The change that switches the rule off."""
         return Replacement(self.file, self.text, self.without)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,8 @@ import numpy as np
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.worker import Reading
-from benchmarks.suites.scoring.calibration import squared_distances
-from benchmarks.support.code_copy import CodeCopy, environment
+from benchmarks.suites.scoring.calibration import BEYOND_D2, squared_distances
+from benchmarks.support.code_copy import CodeCopy, Replacement, environment
 from extractor import Status
 
 WRONG_POSITION, SAME_PLACE = (
@@ -28,13 +29,15 @@ class PictureScore(NamedTuple):
 
     Attributes:
         wrong_ids: reported at the place of another marker, or in a picture without a pattern.
-        wrong_positions: reported more than half of the shortest edge from their place, but at no other's.
+        wrong_positions: reported more than half of the shortest edge from their place, but not at another marker's
+            place.
         lost: visible, not reported.
-        visible: visible ones.
+        visible: visible markers.
         measured: measured, not wrong.
         squared_px2: the sum of their squared errors, both axes.
         reported: reported, not wrong.
         d2: the sum of their squared errors over stated covariances.
+        beyond: reported, not wrong, with such a square above ``BEYOND_D2``.
         ms: processor time; NaN after an exception.
     """
 
@@ -46,6 +49,7 @@ class PictureScore(NamedTuple):
     squared_px2: float
     reported: int
     d2: float
+    beyond: int
     ms: float
 
     @property
@@ -63,14 +67,32 @@ def read_without(
         ValueError: a rule's text does not occur exactly once.
         RuntimeError: the reader cannot be built or run.
     """
-    names = ", ".join(rule.name for rule in rules) or "any change"
+    try:
+        readings = read_changed([rule.change for rule in rules], [one.path for one in pictures], preset, copy)
+    except RuntimeError as error:
+        names = ", ".join(rule.name for rule in rules) or "any change"
+        raise RuntimeError(f"without {names}: {error}") from error
+    return [
+        score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
+    ]
+
+
+def read_changed(
+    changes: Iterable[Replacement], pictures: Sequence[Path], preset: str, copy: CodeCopy
+) -> list[Reading]:
+    """What the copy of the reader finds in the pictures when its texts are changed.
+
+    Raises:
+        ValueError: a text to be replaced does not occur exactly once.
+        RuntimeError: the reader cannot be built or run.
+    """
     out = copy.folder / "readings"
-    with copy.replaced([rule.change for rule in rules]):
+    with copy.replaced(changes):
         result = subprocess.run(
             [
                 *(sys.executable, "-m", "benchmarks.suites.ablation.worker"),
                 *(str(copy.folder), preset, str(out)),
-                *(str(picture.path) for picture in pictures),
+                *map(str, pictures),
             ],
             cwd=copy.folder,
             env=environment(copy.folder),
@@ -79,18 +101,15 @@ def read_without(
             check=False,
         )
     if result.returncode != 0:
-        raise RuntimeError(f"without {names}: {result.stderr[-2000:]}")
-    readings = [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
-    return [
-        score_reading(reading, picture.truths) for reading, picture in zip(readings, pictures, strict=True)
-    ]
+        raise RuntimeError(result.stderr[-2000:])
+    return [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
 
 
 def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureScore:
-    """The score of a reading against the pattern in the picture that it is nearest to."""
+    """The score of a reading against the nearest pattern in the picture."""
     reported = reading.status != Status.LOST
     if not truths:
-        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, 0, 0.0, reading.ms)
+        return PictureScore(int(reported.sum()), 0, 0, 0, 0, 0.0, 0, 0.0, 0, reading.ms)
     scores = [_score_pattern(reading, truth) for truth in truths]
     return min(scores, key=lambda score: (score.wrong, score.lost))
 
@@ -116,5 +135,6 @@ def _score_pattern(reading: Reading, truth: PatternTruth) -> PictureScore:
         squared_px2=float((error_px[measured] ** 2).sum()),
         reported=int(right.sum()),
         d2=float(d2[np.isfinite(d2)].sum()),
+        beyond=int((d2 > BEYOND_D2).sum()),
         ms=reading.ms,
     )

@@ -2,7 +2,7 @@
 
     python -m benchmarks.suites.ablation.worker FOLDER PRESET OUT PICTURE ...
 
-The process imports the ``extractor`` of FOLDER, and nothing that needs another one.
+The process imports the ``extractor`` of FOLDER, and no module that needs another extractor.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 
 class Reading(NamedTuple):
-    """What was read in one picture.
+    """The reading of one picture.
 
     Attributes:
         xy_px: (M, 2) float64, NaN where lost.

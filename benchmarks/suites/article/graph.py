@@ -1,6 +1,6 @@
 """The article's connection of triangles: corners that meet are merged into a graph of markers (eqs. 4-5).
 
-The extractor numbers the cell mesh instead and is compared with this graph. Plain Python, slower than need be.
+The extractor numbers the cell mesh instead and is compared with this graph. Plain Python, not optimised.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The article's spin-search algorithm (SSA): the graph is numbered from the white cell, clockwise, layer by layer.
 
-Plain Python, slower than need be.
+Plain Python, not optimised.
 """
 
 from __future__ import annotations

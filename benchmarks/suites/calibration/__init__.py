@@ -1,1 +1,1 @@
-"""Pictures on which stated covariances are held against true errors, and their reading."""
+"""Pictures on which stated covariances are compared with true errors, and their reading."""

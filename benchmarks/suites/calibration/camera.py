@@ -18,7 +18,7 @@ TURNS, QUICK_TURNS = 8, 1  # pictures of every single effect; four have all stre
 
 @dataclass(frozen=True, eq=False)
 class DesignedPositions:
-    """The true positions in a picture: those of the design, as the lens shows them.
+    """The true positions in a picture: the positions of the design, mapped by the lens.
 
     Attributes:
         marker_xy_px: (M, 2).

@@ -1,7 +1,8 @@
 """The pictures of a run: no effect, each effect alone at graded strength, all effects combined at random.
 
-A run's seed and a picture's number fix the picture. Without a seed, the commit's hash gives one: nobody can tune to
-pictures that the next commit exchanges.
+A run's seed and a picture's number fix the picture. The default seed comes from the commit's hash, so that no rule can
+be tuned to
+the pictures: they change with the next commit.
 """
 
 from __future__ import annotations

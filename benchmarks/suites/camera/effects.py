@@ -1,6 +1,6 @@
-"""The effects in the order of a camera. Each changes a chain with a strength from 0 (no change) to 1 (the hardest).
+"""The effects in the order of a camera. Each changes a chain with a strength from 0 (no change) to 1 (the largest).
 
-What a strength does not fix (directions, signs, kinds) is drawn at random. A new effect is one function and one line
+Directions, signs and kinds are drawn at random. A new effect is one function and one line
 in ``EFFECTS``.
 """
 
@@ -100,7 +100,7 @@ def change_surround(chain: Chain, strength: float, rng: Rng) -> Chain:
 
 
 def shift_colors(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Each color's cells shifted by themselves, by up to 0.1 pitch."""
+    """The cells of each color shifted separately, by up to 0.1 pitch."""
     return replace(chain, pad=replace(chain.pad, color_shift=0.1 * strength))
 
 

@@ -1,4 +1,4 @@
-"""The lens: where it draws a point, how it spreads light, and how much of it reaches the corners."""
+"""The lens: places of points, spread of light, and loss of light in the corners."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Inks:
 
 @dataclass(frozen=True)
 class Surround:
-    """What lies around the pattern: its kind, its linear reflectance, and the strength of its texture, 0 to 1."""
+    """The surround of the pattern: kind, linear reflectance, and strength of the texture, 0 to 1."""
 
     kind: SurroundKind = "plain"
     rgb: RGB = (0.0070, 0.0070, 0.0070)
@@ -67,9 +67,9 @@ class Pad:
     """The differences of a pad from its design.
 
     Attributes:
-        color_shift: the longest shift of a color's cells, as a share of the pitch. Each color has a shift of its own;
+        color_shift: the longest shift of a color's cells, as a share of the pitch. Each color has a different shift;
             the mean shift of red, green and blue is zero.
-        corner_scatter_px: every corner of every colored cell moves by itself by up to this distance, in px at the
+        corner_scatter_px: every corner of every colored cell moves independently by up to this distance, in px at the
             pattern's middle.
         rounding: radius of the corners as a share of the pitch.
         bleed: every side of a colored cell moves outward by up to this share of the pitch.

@@ -154,7 +154,7 @@ def marker_outcomes(picture: CameraPicture, markers: Markers) -> NDArray[np.str_
 
 
 def warm_up(preset: Preset) -> None:
-    """Load what the first reading loads before times are measured, and keep OpenCV to one thread."""
+    """Load all modules before times are measured, and keep OpenCV to one thread."""
     import cv2
 
     cv2.setNumThreads(1)

@@ -3,10 +3,10 @@
 The pattern is drawn with exact coverage, through the lens's geometry and its sharp point spread, in linear light. All
 further stages work on this light.
 
-The true position of a marker is the designed one, seen through the pose, the distortion and the green channel. Errors
-of the pad (shifted colors, scattered, rounded or bled corners) do not move the truth: they are what the reader has to
-bear. The chromatic aberration displaces red and blue in opposite directions about green. Motion is centred: the truth
-is the position in the middle of the exposure.
+The true position of a marker is the designed position, mapped through the pose, the distortion and the green channel.
+Errors of the pad (shifted colors, scattered, rounded or bled corners) do not move the truth: they count as errors of
+the reader. The chromatic aberration displaces red and blue in opposite directions about green. Motion is centred: the
+truth is the position in the middle of the exposure.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def measure_case(case: SceneCase, repetitions: int) -> list[MethodResult]:
         }
         current = samples if seed >= 0 else {method.name: _MethodSamples() for method in methods}
         for method in methods:
-            if previous:  # reads the frame before, so that the caches hold this method's data
+            if previous:  # reads the previous frame, so that the caches hold this method's data
                 method.read(case, np.asarray(previous[method.board].image, np.uint8))
             _update_samples(
                 method, case, scenes[method.board].layout, rendered[method.board], current[method.name]

@@ -1,4 +1,4 @@
-"""Errors over bounds, stated errors and times, pooled over many scenes: one figure a method."""
+"""Errors over bounds, stated errors and times, pooled over many scenes: one figure per method."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ DPI_SHARES = (0.25, 0.15, 0.35, 0.1, 0.15)
 
 @dataclass(frozen=True)
 class CouponCase:
-    """A coupon's kerfs by patch (x, y), its view, and what kind of camera and sheet it has."""
+    """A coupon's kerfs by patch (x, y), its view, and the kind of camera and sheet."""
 
     number: int
     camera: str

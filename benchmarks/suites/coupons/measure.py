@@ -20,7 +20,7 @@ FINE_DPI = 600.0
 
 @dataclass(frozen=True, eq=False)
 class CouponErrors:
-    """What was read of one case: errors and stated deviations of all kerfs, mm."""
+    """The reading of one case: errors and stated deviations of all kerfs, mm."""
 
     case: CouponCase
     error_mm: NDArray[np.float64]

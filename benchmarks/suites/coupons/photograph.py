@@ -27,7 +27,7 @@ LARGEST_BLUR_PX = 20.0
 
 @dataclass(frozen=True)
 class CouponView:
-    """How a coupon is pictured.
+    """The view of a coupon.
 
     Attributes:
         scale_px_mm: pixels per mm.
@@ -87,7 +87,7 @@ def photograph_coupon(
 
 
 def opening_outlines_mm(patch: Patch, kerf_mm: tuple[float, float]) -> list[Points]:
-    """The outlines that an elliptic beam leaves of a patch's openings, in the coupon's frame."""
+    """The outlines of a patch's openings after cutting with an elliptic beam, in the coupon's frame."""
     half = np.array(kerf_mm) / 2
     outlines = []
     for o in patch.openings:

@@ -34,7 +34,7 @@ class DepthErrors:
         row: the assumption.
         press_mm: the press.
         depth_um: (N,) errors of the displacement along z of pressed markers.
-        short: share by which their displacement reads short.
+        short: share by which their measured displacement is too small.
         position: (M,) squared errors of positions over their covariances, per axis.
         displacement: (M,) the same of displacements.
         misfit: of the rest frame.
@@ -97,7 +97,7 @@ class PooledErrors:
     Attributes:
         mean_um: the mean over frames of the mean absolute depth error.
         bias_um: the mean over frames of the absolute mean depth error.
-        short_percent: the mean; ``short_range_percent``: least and most.
+        short_percent: the mean; ``short_range_percent``: smallest and largest value.
         z_position, z_displacement: see the module.
         misfit: of the rest frames, median.
         warned_percent: of the frames.
@@ -117,7 +117,7 @@ class PooledErrors:
 
     @property
     def limit_um(self) -> float:
-        """What the mean depth error may be with true constants."""
+        """Limits of the mean depth error with true constants."""
         return LIMIT_UM + 1e3 * LIMIT_SHARE * self.press_mm
 
 

@@ -1,4 +1,4 @@
-"""Random sensors with window and gel, and what is read of their pictures under random presses."""
+"""Random sensors with window and gel, and the readings of their pictures under random presses."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class RandomRig:
     cameras: tuple[Pinhole, ...]
 
     def rig(self, medium: Medium | None) -> Rig:
-        """What a rig file would say, without poses, with this medium."""
+        """The rig without poses, with this medium."""
         read = None
         if medium is not None:
             read = ReadMedium(medium.gel_mm, medium.gel_index, medium.window_mm, medium.window_index)
@@ -50,7 +50,9 @@ class RandomRig:
         )
 
     def tilted(self, azimuth_rad: float, tilt_rad: float) -> tuple[Pinhole, ...]:
-        """The cameras with a window that is tilted against the pattern; the gel is as thick in the middle."""
+        """The cameras with a window that is tilted against the pattern; the gel's thickness in the middle does not
+        change.
+        """
         normal = np.array(
             [np.sin(tilt_rad) * np.cos(azimuth_rad), np.sin(tilt_rad) * np.sin(azimuth_rad), np.cos(tilt_rad)]
         )
@@ -65,7 +67,7 @@ class RandomRig:
 
 @dataclass(frozen=True)
 class Reading:
-    """The markers of one pressed frame as they are read, and as they are."""
+    """The read and the true markers of one pressed frame."""
 
     press_mm: float
     rest: tuple[Markers, ...]
@@ -101,7 +103,7 @@ def random_rig(rng: np.random.Generator) -> RandomRig:
 
 
 def read_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[tuple[Reading, Reading]]:
-    """For every press the reading through the parallel window, and through one that is tilted by 1 degree."""
+    """For every press the reading through the parallel window, and through a window that is tilted by 1 degree."""
     views = ViewExtractor(parse_layout(layout_to_json(found.layout)), found.rig(found.medium))
     windows = (found.cameras, found.tilted(float(rng.uniform(0, 2 * np.pi)), np.radians(1.0)))
     half_mm = float(np.abs(found.layout.marker_xy_mm).max())

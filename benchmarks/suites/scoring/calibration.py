@@ -121,7 +121,7 @@ def _ratio_of_sums(numerator: Floats, denominator: Floats) -> Estimate:
 
 
 def calibration_cells(calibration: Calibration) -> tuple[str, ...]:
-    """The texts of one row, in the order of ``COLUMNS``; "-" for what is not known."""
+    """The texts of one row, in the order of ``COLUMNS``; "-" for unknown values."""
     z, beyond = calibration.z, calibration.beyond
     return (
         str(calibration.pictures),

@@ -64,7 +64,7 @@ class CaseReading(NamedTuple):
 
 @cache
 def cached_extractor(pattern: str, layers: int) -> Extractor:
-    """It reads both sides: one condition shows the back."""
+    """An extractor that reads both sides: one condition shows the back."""
     return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))), side="either")
 
 
@@ -120,7 +120,7 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
 
 
 def warm_up() -> None:
-    """Load what the first reading loads before times are measured."""
+    """Load all modules before times are measured."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -139,7 +139,9 @@ def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
         x, y = truth.marker_xy_px[marker]
         status = Status(markers.status[marker]).name.lower()
         visibility = "visible" if truth.visible[marker] else "not visible"
-        line = f"marker {marker} {status}, truly at ({x:.1f}, {y:.1f}), {visibility}, edge {edge_px[marker]:.1f} px"
+        line = (
+            f"marker {marker} {status}, truth ({x:.1f}, {y:.1f}), {visibility}, edge {edge_px[marker]:.1f} px"
+        )
         if wrong[marker]:
             error = np.linalg.norm(markers.xy_px[marker] - truth.marker_xy_px[marker])
             line += f": WRONG by {error:.1f} px"

@@ -46,7 +46,7 @@ def picture_squares(markers: Markers, truth: TruePositions) -> dict[str, NDArray
 
 
 def nearest_truth(markers: Markers, truths: Sequence[TruePositions]) -> TruePositions:
-    """Of several patterns in a picture the one that was read: that with the smallest median error."""
+    """The pattern that was read, of several patterns in a picture: the pattern with the smallest median error."""
 
     def median_px(truth: TruePositions) -> float:
         error_px = np.linalg.norm(markers.xy_px - truth.marker_xy_px, axis=1)
@@ -57,7 +57,7 @@ def nearest_truth(markers: Markers, truths: Sequence[TruePositions]) -> TruePosi
 
 
 def calibrations_by_position(pictures: Sequence[PictureSquares]) -> dict[str, Calibration]:
-    """The calibration of all pictures by ``POSITIONS``, without those that no picture has."""
+    """The calibration of all pictures by ``POSITIONS``, without kinds that no picture has."""
     found = {
         name: summarise([squares[name] for squares in pictures if name in squares]) for name in POSITIONS
     }

@@ -1,4 +1,4 @@
-"""Images without a pattern, or with another pattern: nothing may be reported on them."""
+"""Images without a pattern, or with another pattern: no marker may be reported."""
 
 from __future__ import annotations
 

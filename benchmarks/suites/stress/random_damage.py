@@ -170,7 +170,7 @@ def _make_change(draw: DamageSampler) -> FrameChange:
     return change
 
 
-# The white cell may be hidden, so no share is promised.
+# The white cell may be hidden; therefore no share is promised.
 RANDOM_KINDS = group_kinds(
     "drawn at random",
     *(

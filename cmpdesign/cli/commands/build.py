@@ -47,9 +47,9 @@ def build(
     """Write a design's files.
 
     The files are the SVG, the layout file, a preview and a report, or the products that --only names.
-    Files in laser/, mold/, mesh/ and print/ that an earlier build made and this one does not are removed, and so
+    Files in laser/, mold/, mesh/ and print/ that an earlier build made and this build does not make are removed, and so
     are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
-    prints are read as the camera sees them before files are written. Exit code 1: a finding is an error.
+    prints are read as the camera sees the pads before files are written. Exit code 1: a finding is an error.
     """
     from dataclasses import asdict
 
@@ -71,7 +71,7 @@ def build(
     for path in built.written:
         say(f"wrote {printable_path(path)}")
     for path in built.removed:
-        say(f"removed {printable_path(path)}, of an earlier build")
+        say(f"removed {printable_path(path)}: written by an earlier build")
     print_report(built.report)
     for name, reading in built.readings.items():
         say(f"{name} as made: {reading.line()}")
@@ -97,7 +97,7 @@ def build(
 
 
 def _watch(steps: Steps, number: int) -> Callable[[str], None]:
-    """What is called with the name of each of a number of products, and of other steps, before it is made."""
+    """The function that is called with the name of each product or other step before the product is made."""
     begun = 0
 
     def watch(name: str) -> None:

@@ -30,7 +30,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Repeat the article's experiments on a simulated sensor, and compare designs.\n\nWrites report.html and "
-    "report.json. A run that was interrupted continues where it stopped.",
+    "report.json. The same command continues an interrupted run.",
 )
 
 Output = Annotated[
@@ -40,10 +40,11 @@ Seed = Annotated[
     int, typer.Option(min=0, help="Seed of all random values: the same seed gives the same figures.")
 ]
 Workers = Annotated[
-    int | None, typer.Option(min=1, help="Processes. [default: one for each core]", show_default=False)
+    int | None,
+    typer.Option(min=1, help="Number of processes. [default: one for each core]", show_default=False),
 ]
 SensorOption = Annotated[
-    str, typer.Option(metavar="NAME|FILE", help="Simulated sensor: shipped, or a TOML file.")
+    str, typer.Option(metavar="NAME|FILE", help="Simulated sensor: a template's name, or a TOML file.")
 ]
 
 

@@ -33,13 +33,16 @@ def kerf(
     photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="A photo or scan of the cut piece.")],
     face: Annotated[
         SeenFace | None,
-        typer.Option(help="The face whose openings are seen. [default: the narrower one by the taper]"),
+        typer.Option(
+            help="The face whose openings are seen. [default: the face with the narrower openings, by the "
+            "taper]"
+        ),
     ] = None,
     response: Annotated[
         str | None,
         typer.Option(
             metavar=METAVAR,
-            help="Response of the camera. [default: as the file states, else sRGB, corrected by the edges]",
+            help="Response of the camera. [default: the response in the file, else sRGB, corrected by the edges]",
         ),
     ] = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
@@ -75,7 +78,8 @@ def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
     )
     assumed = ", which is assumed" if coupon.taper_assumed else ""
     say(
-        f"seen are the openings of the {reading.face}; the other face by a taper of {coupon.taper_deg:g} degrees"
+        f"the picture shows the openings of the {reading.face}; the other face by a taper of {coupon.taper_deg:g} "
+        "degrees"
         f"{assumed}, through {coupon.thickness_mm:g} mm"
     )
     table = Table(box=None, pad_edge=False)

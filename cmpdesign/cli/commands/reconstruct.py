@@ -63,7 +63,8 @@ def reconstruct(
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=OUTPUT_HELP)],
     from_rest: Annotated[
-        bool, typer.Option("--from-rest", help="Place all views by REST, also those whose pose RIG gives.")
+        bool,
+        typer.Option("--from-rest", help="Place all views by REST, also the views whose pose RIG gives."),
     ] = False,
     flatness_mm: Annotated[
         float, typer.Option(metavar="MM", help="Largest distance of the markers from a plane at rest.")
@@ -76,14 +77,16 @@ def reconstruct(
         bool,
         typer.Option(
             "--surface",
-            help="Also write the touched surface, computed with the [elastomer] of RIG, in columns of its own.",
+            help="Also write the touched surface, computed with the [elastomer] of RIG, in separate columns.",
         ),
     ] = False,
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
     frames: FramesOption = None,
-    cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    cold: Annotated[
+        bool, typer.Option("--cold", help="Number every frame without the previous frame: slower.")
+    ] = False,
     preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     side: SideOption = "designed",
@@ -95,7 +98,7 @@ def reconstruct(
     live_port: LivePortOption = None,
     live_wait: LiveWaitOption = 0.0,
     recover: Annotated[
-        bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
+        bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
     ] = False,
 ) -> None:
     """Reconstruct a surface from several views.
@@ -151,14 +154,16 @@ def _print_followed(followed: Followed) -> tuple[Path, ...]:
 
 
 def _describe_positions(depth_mm: float | None, is_continued: bool) -> str:
-    """Of what the positions are: what the cameras see is the pattern, wherever it lies."""
+    """The surface of the positions: the cameras see the pattern, at any depth."""
     if is_continued:
-        return f"of the pattern, {depth_mm:g} mm below the touched surface; surface_* of that surface"
+        return (
+            f"of the pattern, {depth_mm:g} mm below the touched surface; surface_* are of the touched surface"
+        )
     if depth_mm is None:
         return "of the pattern; RIG does not state the pattern's depth below the touched surface"
     if depth_mm == 0:
         return "of the pattern, which RIG puts on the touched surface"
-    return f"of the pattern, {depth_mm:g} mm below the touched surface; not of that surface"
+    return f"of the pattern, {depth_mm:g} mm below the touched surface; not of the touched surface"
 
 
 def _print_summary(summary: Mapping[str, Any]) -> None:

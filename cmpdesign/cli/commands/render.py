@@ -91,7 +91,10 @@ def render(
     ] = 0.0,
     mirrored: Annotated[
         bool | None,
-        typer.Option("--mirrored/--front", help="See the back or the front. [default: as designed]"),
+        typer.Option(
+            "--mirrored/--front",
+            help="Side of the pattern that the camera sees: the back or the front. [default: as designed]",
+        ),
     ] = None,
     press: Annotated[
         float,
@@ -115,12 +118,12 @@ def render(
         str,
         typer.Option(
             metavar=METAVAR,
-            help="Response of the camera; with an exponent light is value ** exponent.",
+            help="Response of the camera; with an exponent, light is value ** exponent.",
         ),
     ] = "srgb",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
 ) -> None:
-    """Render a pattern as a camera sees it. Seeded, exact to a thousandth of a pixel."""
+    """Render a pattern as a camera sees the pattern. The picture is seeded, and exact to a thousandth of a pixel."""
     if scene is not None:
         from cmpdesign.cli.commands.render_scene import render_scene_file
 
@@ -154,7 +157,7 @@ def render(
 
 @contextmanager
 def _option_names_in_errors() -> Iterator[None]:
-    """Within this context, errors of a scene name the option in the place of the scene's field."""
+    """Within this context, errors of a scene name the option instead of the scene's field."""
     from cmpdesign.scene import SceneError
 
     try:

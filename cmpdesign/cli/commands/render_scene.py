@@ -75,7 +75,7 @@ def _render_image(file: SceneFile, output: Path, truth: Path | None) -> None:
 def _finish(
     file: SceneFile, output: Path, truth: Path | None, words: str, visible: tuple[int, ...] | None
 ) -> None:
-    """Print what was written."""
+    """Print the written files."""
     from cmpdesign.cli.documents.runs import RenderDocument
 
     if truth is not None:

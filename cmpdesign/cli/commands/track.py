@@ -74,7 +74,9 @@ def track(
     quiver: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Arrows of the frame with the largest displacement.")
     ] = None,
-    cold: Annotated[bool, typer.Option("--cold", help="Never start from the frame before: slower.")] = False,
+    cold: Annotated[
+        bool, typer.Option("--cold", help="Number every frame without the previous frame: slower.")
+    ] = False,
     preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     side: SideOption = "designed",
@@ -86,7 +88,7 @@ def track(
     live_port: LivePortOption = None,
     live_wait: LiveWaitOption = 0.0,
     recover: Annotated[
-        bool, typer.Option("--recover", help="Only complete the FILE that a killed run left in pieces.")
+        bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
     ] = False,
 ) -> None:
     """Follow a pattern through a sequence.

@@ -1,6 +1,6 @@
 """``cmpdesign verify``: verifies images against a layout.
 
-An image that shows the code of a print sheet is judged as a print: its layout, scales and skew.
+An image that shows the code of a print sheet is judged as a print: layout, scales and skew are measured.
 """
 
 from __future__ import annotations
@@ -71,14 +71,17 @@ def verify(
     sheet_dpi: Annotated[
         float | None,
         typer.Option(
-            min=0, help="The pictures are print sheets of this resolution (0: unknown), whatever files say."
+            min=0,
+            help="The pictures are print sheets of this resolution (0: unknown); the files' own resolution is "
+            "ignored.",
         ),
     ] = None,
     frames: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Read this many frames of each video, camera or stream. [default: all of a video, else one]",
+            help="Read this many frames of each video, camera or stream. [default: all of a video, one of a camera or "
+            "stream]",
         ),
     ] = None,
     preset: PresetOption = "balanced",
@@ -127,7 +130,7 @@ class _Folders(NamedTuple):
 
 
 class _Settings(NamedTuple):
-    """The options that decide what is read, as a report keeps them."""
+    """The options of the reading, as written into a report."""
 
     preset: str
     response: str | None
@@ -144,7 +147,7 @@ def _new_report(layout: Path, settings: _Settings) -> ProblemReport:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one image.
+    """The result of one image.
 
     Attributes:
         fields: of the image's part of the document.

@@ -1,4 +1,4 @@
-"""The documents that commands print with ``--json``: one model each, from which the JSON Schema comes.
+"""The documents that commands print with ``--json``: one model for each; the JSON Schema is made from the model.
 
-In: what a command found. Out: a checked document of stated format and version.
+In: the result of a command. Out: a checked document of stated format and version.
 """

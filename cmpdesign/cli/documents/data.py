@@ -10,13 +10,13 @@ from cmpdesign.cli.documents.document import Document
 
 
 class DatasetDocument(Document):
-    """What the data set of ``dataset`` or ``extract`` holds now."""
+    """The present contents of the data set of ``dataset`` or ``extract``."""
 
     format: Literal["cmp-dataset-run"] = "cmp-dataset-run"
     version: Literal[1] = 1
     written: str
     frames: int
-    shards: int = Field(description="Finished ones.")
+    shards: int = Field(description="Finished shards.")
     of_shards: int = Field(description="Shards of the whole plan.")
-    redrawn: int = Field(description="Draws that could not be rendered, and were drawn anew.")
-    bytes: int = Field(description="Of the finished shards' files.")
+    redrawn: int = Field(description="Drawn parameters that could not be rendered and were drawn anew.")
+    bytes: int = Field(description="Total size of the finished shards' files.")

@@ -1,4 +1,4 @@
-"""Documents of the commands that take a design, and of those with which a design begins."""
+"""Documents of the commands that take a design, and of the commands with which a design begins."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ class FindingPart(Part):
     """One feature that cannot be made or read."""
 
     severity: Literal["error", "warning"] = Field(
-        description="error: will not work. warning: works under good conditions only."
+        description="error: the feature will not work. warning: the feature works under good conditions only."
     )
     subject: str
     value: float
     limit: float
-    unit: str = Field(description="Of value and limit; empty for a plain number.")
+    unit: str = Field(description="Unit of value and limit; empty for a plain number.")
     remedy: str
 
 
 class PadReadingPart(Part):
-    """What the reader reads of the pad that a product makes; null where no marker was measured."""
+    """The reading of the pad that a product makes; null where no marker was measured."""
 
     measured_share: float = Field(description="Measured markers over visible markers.")
     side_seen: Literal["front", "back"] | None
     rms_px: float | None = Field(description="Deviation of the markers from their nominal places.")
     rms_mm: float | None
-    rms_pitch: float | None = Field(description="In distances of neighbouring markers.")
+    rms_pitch: float | None = Field(description="The same deviation, in distances of neighbouring markers.")
     worst_px: float | None
     worst_mm: float | None
     worst_pitch: float | None
@@ -47,10 +47,10 @@ class BuildDocument(Document):
     version: Literal[1] = 1
     digest: str = Field(description="Of the layout, as in layout.json.")
     folder: str
-    written: tuple[str, ...] = Field(description="Files, with the folder.")
-    removed: tuple[str, ...] = Field(description="Files of earlier builds.")
+    written: tuple[str, ...] = Field(description="Written files, with the folder.")
+    removed: tuple[str, ...] = Field(description="Removed files of earlier builds.")
     report: dict[str, Any] = Field(description="Key figures, by the names of report.json.")
-    as_made: dict[str, PadReadingPart] = Field(description="By product.")
+    as_made: dict[str, PadReadingPart] = Field(description="Product -> reading of its pad.")
     findings: tuple[FindingPart, ...]
 
 
@@ -60,8 +60,8 @@ class CheckDocument(Document):
     format: Literal["cmp-check"] = "cmp-check"
     version: Literal[1] = 1
     digest: str = Field(description="Of the layout, as in layout.json.")
-    passed: bool = Field(description="No finding is an error.")
-    as_made: dict[str, PadReadingPart] = Field(description="By product, with --read.")
+    passed: bool = Field(description="True if no finding is an error.")
+    as_made: dict[str, PadReadingPart] = Field(description="Product -> reading of its pad, with --read.")
     not_read: dict[str, str] = Field(description="Product -> why its pad cannot be made, with --read.")
     findings: tuple[FindingPart, ...]
 
@@ -71,26 +71,26 @@ class SizeDocument(Document):
 
     format: Literal["cmp-size"] = "cmp-size"
     version: Literal[1] = 1
-    camera_px: tuple[int, int] = Field(description="Width and height.")
-    view_mm: tuple[float, float] = Field(description="Field of view, width and height.")
+    camera_px: tuple[int, int] = Field(description="Width and height of the camera's picture.")
+    view_mm: tuple[float, float] = Field(description="Width and height of the field of view.")
     scale_px_per_mm: float
     design: dict[str, Any] = Field(description="The fields of a design file.")
     markers: int
     pitch_px: float
-    error_px: float = Field(description="Predicted per marker and axis, of inner markers.")
+    error_px: float = Field(description="Predicted error per marker and axis, of inner markers.")
     error_um: float
     rim_error_um: float
-    told_apart_mm: float = Field(description="Distance of two touches that can be told apart.")
+    told_apart_mm: float = Field(description="Smallest distance at which two touches can be told apart.")
     limit: str = Field(description="Limit that a finer pattern would exceed.")
 
 
 class TemplatePart(Part):
-    """One template that is shipped."""
+    """One template."""
 
     kind: str
     name: str
     description: str
-    source: str = Field(description="Where the values come from; empty where each value has its own source.")
+    source: str = Field(description="Source of the values; empty where each value has a source of its own.")
 
 
 class TemplatesDocument(Document):

@@ -18,10 +18,10 @@ def _require_format(schema: dict[str, Any]) -> None:
 
 
 class Document(Part):
-    """What a command prints with ``--json``.
+    """The document that a command prints with ``--json``.
 
-    A document has the fields ``format`` and ``version``. A version is raised when a field goes, or changes its meaning
-    or type; fields may be added without that.
+    A document has the fields ``format`` and ``version``. The version rises when a field is removed or changes its
+    meaning or type; a new field does not raise the version.
     """
 
     model_config = ConfigDict(json_schema_extra=_require_format)
@@ -36,6 +36,8 @@ class Message(Document):
 
     format: Literal["cmp-message"] = "cmp-message"
     version: Literal[1] = 1
-    level: Literal["error", "warning", "step"] = Field(description="step: what was done, with --verbose.")
+    level: Literal["error", "warning", "step"] = Field(description="step: a finished step, with --verbose.")
     text: str
-    exit_code: int | None = Field(None, description="Of an error: 2 bad input, 130 stopped by Ctrl-C.")
+    exit_code: int | None = Field(
+        None, description="Exit code of an error: 2 bad input, 130 stopped by Ctrl-C."
+    )

@@ -13,36 +13,36 @@ class QualityPart(Part):
     """Properties of a picture; null where unknown."""
 
     blur_px: float | None = Field(description="Sigma of the Gaussian that optics and pixel make together.")
-    noise: float | None = Field(description="Standard deviation in 255ths.")
-    contrast: float | None = Field(description="Between the weakest inks, in 255ths.")
+    noise: float | None = Field(description="Standard deviation of the noise, in 255ths.")
+    contrast: float | None = Field(description="Contrast between the weakest inks, in 255ths.")
     clipping: float | None = Field(description="Share of the cells that are overexposed.")
-    evenness: float | None = Field(description="Of the light, 0 to 1.")
-    edge_px: float | None = Field(description="Length of a gridline.")
+    evenness: float | None = Field(description="Evenness of the light, 0 to 1.")
+    edge_px: float | None = Field(description="Median length of a gridline, px.")
     weakest_inks: tuple[str, ...]
-    hints: tuple[str, ...] = Field(description="Limits of the result, with remedies.")
+    hints: tuple[str, ...] = Field(description="Causes that limit the result, with remedies.")
 
 
 class SheetPart(Part):
-    """What a picture of a print sheet shows."""
+    """Measurements of a picture of a print sheet."""
 
     name: str
     digest: str
-    length_x_px: float = Field(description="Of the bar along x.")
+    length_x_px: float = Field(description="Length of the bar along x.")
     length_y_px: float
     scale_x: float | None = Field(description="Printed over designed; null without a known resolution.")
     scale_y: float | None
     ratio: float = Field(description="scale_x / scale_y.")
     skew_deg: float = Field(description="Angle between the bars, less 90 degrees.")
-    rotation_deg: float = Field(description="Of the bar along x in the picture, clockwise.")
+    rotation_deg: float = Field(description="Clockwise turn of the bar along x in the picture.")
     perspective_mm: float = Field(description="Distance of a bar's end from the best affine map.")
     dpi: tuple[float, ...] | None
     note: str | None
 
 
 class ImagePart(Part):
-    """The verdict on one picture. The fields that are not set do not apply: of unread pictures or of sheets."""
+    """The verdict on one picture. Fields that do not apply are not set: of unread pictures, or of print sheets."""
 
-    image: str = Field(description="Its path, or the name of a source and the number of a frame.")
+    image: str = Field(description="Path of the picture, or the name of a source and the number of a frame.")
     verified: bool
     error: str | None = Field(None, description="Why the picture could not be read.")
     reason: str | None = Field(None, description="Why the picture is not verified.")
@@ -57,8 +57,8 @@ class ImagePart(Part):
         None, description="Cells whose color contradicts the layout."
     )
     quality: QualityPart | None = None
-    timings_ms: dict[str, float] | None = Field(None, description="By stage.")
-    sheet: SheetPart | None = Field(None, description="Of a picture of a print sheet.")
+    timings_ms: dict[str, float] | None = Field(None, description="Stage -> time, ms.")
+    sheet: SheetPart | None = Field(None, description="Measurements, if the picture shows a print sheet.")
 
 
 class VerifyDocument(Document):
@@ -67,9 +67,9 @@ class VerifyDocument(Document):
     format: Literal["cmp-verification"] = "cmp-verification"
     version: Literal[1] = 1
     pattern: str
-    digest: str = Field(description="Of the layout.")
+    digest: str = Field(description="Digest of the layout.")
     min_share: float
-    verified: bool = Field(description="All pictures are.")
+    verified: bool = Field(description="True if all pictures are verified.")
     images: tuple[ImagePart, ...]
 
     def to_json(self) -> str:
@@ -84,7 +84,7 @@ class PatchPart(Part):
     power_percent: float
     speed_mm_s: float
     passes: int
-    kerf_x_mm: float = Field(description="At the front, as in a material's file.")
+    kerf_x_mm: float = Field(description="Kerf at the front, as in a material's file.")
     kerf_x_back_mm: float
     kerf_x_sigma_mm: float
     kerf_y_mm: float
@@ -103,13 +103,13 @@ class KerfDocument(Document):
     taper_assumed: bool
     thickness_mm: float
     response: str
-    scale_px_mm: float = Field(description="px in a mm.")
+    scale_px_mm: float = Field(description="Scale, px per mm.")
     fit_mm: float = Field(description="RMS residual of the coupon's marks.")
     patches: tuple[PatchPart, ...]
 
 
 class CalibratePatternDocument(Document):
-    """What ``calibrate pattern`` learnt."""
+    """The result of ``calibrate pattern``."""
 
     format: Literal["cmp-calibration-pattern"] = "cmp-calibration-pattern"
     version: Literal[1] = 1
@@ -122,5 +122,5 @@ class CalibratePatternDocument(Document):
     worst_picture: int = Field(description="Number of the picture with the largest residuals, from 0.")
     worst_picture_z: float
     worst_picture_rms_px: float
-    scatter_mm: float = Field(description="Of the markers around their nominal places, per axis.")
+    scatter_mm: float = Field(description="Scatter of the markers around their nominal places, per axis.")
     deviation_mm: float = Field(description="Standard deviation of a measured place, per axis.")

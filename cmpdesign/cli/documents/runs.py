@@ -1,4 +1,4 @@
-"""Documents of the commands that run from a source, and of those that export runs."""
+"""Documents of the commands that run from a source, and of the commands that export runs."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from cmpdesign.cli.documents.reading import QualityPart
 class FramesPart(Part):
     """Numbers of frames."""
 
-    declared: int | None = Field(description="By the source; null where unknown.")
+    declared: int | None = Field(description="Number of frames that the source states; null where unknown.")
     read: int
     tracked: int
-    lost: int = Field(description="Without a pattern.")
+    lost: int = Field(description="Frames without a pattern.")
     unreadable: int
     other_size: int
 
@@ -47,13 +47,15 @@ class LargestPart(Part):
 
 
 class LivePart(Part):
-    """What a live server did."""
+    """The counts of a live server."""
 
     address: str
-    sent: int = Field(description="Frames.")
+    sent: int = Field(description="Sent frames.")
     left_out: int = Field(description="Frames that could not be sent in time.")
-    is_viewer_behind: bool = Field(description="A viewer took fewer messages than were sent to it.")
-    failure: str = Field(description="Why it stopped before the end.")
+    is_viewer_behind: bool = Field(
+        description="True if a viewer received fewer messages than the server sent."
+    )
+    failure: str = Field(description="Why the server stopped before the end.")
 
 
 class TrackDocument(Document):
@@ -67,7 +69,7 @@ class TrackDocument(Document):
     ended_early: str | None = Field(description="Why the run ended early.")
     frames: FramesPart
     reasons: dict[str, int] = Field(
-        description="Why frames are not tracked, or in part only -> their number."
+        description="Why frames are not tracked, or tracked in part -> number of frames."
     )
     starts: dict[str, int] = Field(description="How the numbering was found -> number of frames.")
     marker_shares: SharesPart
@@ -75,7 +77,9 @@ class TrackDocument(Document):
     frames_per_s: float | None
     rest: RestPart | None
     quality: QualityPart | None = Field(description="Medians over the frames.")
-    jitter_px: float | None = Field(description="Per axis, at rest; null with too few resting frames.")
+    jitter_px: float | None = Field(
+        description="Scatter of a marker at rest, per axis; null with too few resting frames."
+    )
     jitter_pairs: int
     largest_displacement: LargestPart | None
     live: LivePart | None = Field(None, description="With --live.")
@@ -87,14 +91,14 @@ class ViewPart(Part):
 
     name: str
     position_mm: tuple[float, float, float]
-    rms_px: float = Field(description="At rest.")
+    rms_px: float = Field(description="RMS residual of the view's pose at rest.")
 
 
 class PositionsPart(Part):
-    """What the positions are positions of."""
+    """The surface to which the positions belong."""
 
     of: Literal["pattern"]
-    depth_mm: float | None = Field(description="Of the pattern below the touched surface.")
+    depth_mm: float | None = Field(description="Depth of the pattern below the touched surface.")
     continued_to_surface: bool
 
 
@@ -110,7 +114,7 @@ class ReconstructDocument(Document):
     frames: FramesPart
     reasons: dict[str, int]
     marker_shares: SharesPart
-    lost_markers: dict[str, int] = Field(description="Why markers have no position -> their number.")
+    lost_markers: dict[str, int] = Field(description="Why markers have no position -> number of markers.")
     sigma_um: tuple[float, ...] | None = Field(description="Median standard deviations in x, y and z.")
     time_ms: dict[str, float]
     views: tuple[ViewPart, ...]
@@ -127,7 +131,7 @@ class RecoverDocument(Document):
 
     format: Literal["cmp-recovery"] = "cmp-recovery"
     version: Literal[1] = 1
-    written: str | None = Field(description="Null where no whole frame was left.")
+    written: str | None = Field(description="Null where no complete frame was found.")
     frames: int
     problems: tuple[str, ...]
 
@@ -138,9 +142,9 @@ class RenderDocument(Document):
     format: Literal["cmp-rendering"] = "cmp-rendering"
     version: Literal[1] = 1
     written: tuple[str, ...]
-    size_px: tuple[int, int] = Field(description="Width and height.")
+    size_px: tuple[int, int] = Field(description="Width and height of the picture.")
     frames: int
-    fps: float | None = Field(description="Of a sequence.")
+    fps: float | None = Field(description="Frames per second of a sequence.")
     visible: tuple[int, ...] | None = Field(description="Visible markers, by view; null for a sequence.")
 
 
@@ -153,11 +157,11 @@ class ExportDocument(Document):
     written: str
     episodes: int
     frames: int
-    fps: float | None = Field(description="Of a LeRobot data set.")
+    fps: float | None = Field(description="Frames per second of a LeRobot data set.")
 
 
 class EvaluateDocument(Document):
-    """What ``evaluate`` wrote, with the document of report.json, whose figures differ by experiment."""
+    """The files of ``evaluate``, and the document of report.json, whose figures differ by experiment."""
 
     format: Literal["cmp-evaluation-run"] = "cmp-evaluation-run"
     version: Literal[1] = 1

@@ -1,4 +1,4 @@
-"""Options that commands share which read images."""
+"""Options shared by the commands that read images."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MaxPixelsOption = Annotated[
         "--max-pixels",
         metavar="COUNT",
         min=256,
-        help="Largest image that is read: its width times its height.",
+        help="Largest image that is read: width times height.",
     ),
 ]
 
@@ -25,12 +25,14 @@ ChannelsOption = Annotated[
 
 SideOption = Annotated[
     Literal["designed", "front", "back", "either"],
-    typer.Option("--side", help="Side of the pattern that the camera sees; designed: as the layout says."),
+    typer.Option(
+        "--side", help="Side of the pattern that the camera sees; designed: as stated in the layout."
+    ),
 ]
 
 PresetOption = Annotated[
     Literal["fast", "balanced", "accurate"],
-    typer.Option("--preset", help="Less time or less error; the same ids."),
+    typer.Option("--preset", help="Speed or accuracy of the positions; the ids are the same."),
 ]
 
 FramesOption = Annotated[int | None, typer.Option("--frames", min=1, help="Stop after this many frames.")]

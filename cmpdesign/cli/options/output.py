@@ -1,4 +1,4 @@
-"""The options that every command has: what it prints, and how."""
+"""The options of output that every command has."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ QuietOption = Annotated[
 ]
 VerboseOption = Annotated[
     bool,
-    typer.Option("--verbose", "-v", help="Also print each step with its time, and where an error arose."),
+    typer.Option(
+        "--verbose",
+        "-v",
+        help="Also print each step with its time, and the place in the code where an error arose.",
+    ),
 ]
 NAMES = ("as_json", "quiet", "verbose")
 

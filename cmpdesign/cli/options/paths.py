@@ -9,7 +9,7 @@ from cmpdesign.errors import CmpDesignError
 
 
 def require_suffix(option: str, path: Path | None, expected: Collection[str]) -> None:
-    """Check the ending of a file to write, if one is given, so that its name tells its format.
+    """Check the ending of the name of a file to write, if a file is given; the ending states the format.
 
     Raises:
         CmpDesignError: another ending.

@@ -1,4 +1,4 @@
-"""Options that the commands share which write recordings."""
+"""Options shared by the commands that write recordings."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from typing import Annotated, Literal
 
 import typer
 
-OUTPUT_HELP = "Table: .npz, .parquet or .csv; or recording: .mcap, .rrd, or without ending a rosbag2 folder."
+OUTPUT_HELP = (
+    "Table: .npz, .parquet or .csv; or recording: .mcap, .rrd, or a rosbag2 folder for a name without ending."
+)
 
 FrameIdOption = Annotated[
     str,
@@ -21,7 +23,7 @@ WithImagesOption = Annotated[
 
 LiveOption = Annotated[
     Literal["foxglove", "rerun"] | None,
-    typer.Option("--live", help="Also show the frames as they come, by a server on this machine."),
+    typer.Option("--live", help="Also show the frames during the run, by a server on this machine."),
 ]
 
 LivePortOption = Annotated[

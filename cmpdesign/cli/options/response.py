@@ -1,4 +1,4 @@
-"""The option ``--response``: how light became the values of an image."""
+"""The option ``--response``: the relation between light and the values of an image."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cmpdesign.errors import CmpDesignError
 
 METAVAR = "srgb|linear|EXPONENT"
 READING_HELP = (
-    "Response of the camera; with an exponent light is value ** exponent. [default: 8 bits srgb, 16 linear]"
+    "Response of the camera; with an exponent, light is value ** exponent. [default: srgb; 16 bits linear]"
 )
 
 
@@ -38,5 +38,5 @@ def parse_response(text: str) -> Literal["srgb", "linear"] | float:
 
 
 def parse_reading_response(text: str | None) -> Literal["srgb", "linear"] | float | None:
-    """As ``parse_response``; None, the response by the image's depth, where the option is not given."""
+    """As ``parse_response``; None where the option is not given: the response follows from the image's depth."""
     return None if text is None else parse_response(text)

@@ -1,4 +1,4 @@
-"""Options that the commands share which work on many parts at the same time."""
+"""Options shared by the commands that work on many parts at the same time."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ SchedulerOption = Annotated[
     str,
     typer.Option(
         metavar="local|dask=ADDRESS",
-        help="This machine, or a dask scheduler by its address or scheduler file.",
+        help="The machine that works: this machine, or a dask scheduler by address or scheduler file.",
     ),
 ]
 
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="Processes on this machine. [default: one for each core]")
+    int | None, typer.Option(min=1, help="Number of processes on this machine. [default: one for each core]")
 ]

@@ -10,7 +10,7 @@ the surface. With a = kh, c = 3 - 4 nu and D = c cosh 2a + 2a^2 + 5 - 12 nu + 8 
     C_zz = (1 - nu) (c sinh 2a - 2a) / (mu k D)        C_LL = (1 - nu) (c sinh 2a + 2a) / (mu k D)
     C_xz = (a^2 - (1 - 2 nu) c sinh^2 a) / (mu k D)     C_SH = tanh(a) / (mu k)
 
-It is continuous in nu up to 1/2. Numerators and denominators are divided by exp(2a) / 2 to avoid overflow.
+This form is continuous in nu up to 1/2. Numerators and denominators are divided by exp(2a) / 2 to avoid overflow.
 
 At a depth d below the surface u_z for t_L has a compliance of its own, u_z = C_zz t_z - i C_zx t_L. With Papkovich's
 and Neuber's potentials 2 mu u = grad(phi + s psi) - 4 (1 - nu) psi e_z at the height s above the support, u = 0 at

@@ -43,8 +43,10 @@ class HeightMap(Indenter):
         heights = np.array(self.heights_mm, dtype=np.float64)
         good = heights.ndim == 2 and min(heights.shape) >= 2
         require(good, "heights_mm", f"of shape {heights.shape}", "two-dimensional, at least 2 x 2 pixels")
-        require(bool(np.isfinite(heights).any()), "heights_mm", "nowhere finite", "finite where something is")
-        require(not np.isinf(heights).any(), "heights_mm", "infinite somewhere", "finite, or NaN for nothing")
+        require(bool(np.isfinite(heights).any()), "heights_mm", "nowhere finite", "finite in the material")
+        require(
+            not np.isinf(heights).any(), "heights_mm", "infinite somewhere", "finite, or NaN for no material"
+        )
         heights.setflags(write=False)
         object.__setattr__(self, "heights_mm", heights)
 
@@ -104,7 +106,7 @@ def _read_npy(path: Path) -> Array:
         raise ContactError(f"{path}: cannot be read as an NPY file ({reason})") from None
     if heights is None:
         raise ContactError(
-            f"{path}: its header claims more numbers than it holds, or more than {MOST_HEIGHTS}"
+            f"{path}: the header states more numbers than the file holds, or more than {MOST_HEIGHTS}"
         )
     if heights.dtype.kind not in "fiu":
         raise ContactError(f"{path}: holds no array of numbers; save heights in mm with numpy.save")

@@ -22,7 +22,7 @@ from extractor import Markers
 
 PREFIX = "scene."  # of the columns with drawn values
 COMPRESSION = "zstd"
-# Columns of every frame -> their types as Arrow names them, and of lists "list of ...".
+# Columns of every frame -> their Arrow types; types of lists are "list of ...".
 HEAD = {
     "key": "string",
     "frame": "int64",
@@ -114,7 +114,7 @@ def _as_kind(value: Any, kind: str) -> Any:
 
 
 def _contact_values(contact: Contact | None) -> dict[str, Any]:
-    """Forces and areas; 0 N where nothing touches."""
+    """Forces and areas; 0 N without contact."""
     if contact is None:
         return {"force_n": [0.0] * 3, "moment_nmm": [0.0] * 3} | dict.fromkeys(list(CONTACT)[2:], 0.0)
     cell_mm2 = float((contact.x_mm[1] - contact.x_mm[0]) * (contact.y_mm[1] - contact.y_mm[0]))

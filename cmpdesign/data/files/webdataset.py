@@ -1,4 +1,4 @@
-"""Tar files as WebDataset reads them: files of one sample have the same name before the first dot and stand together.
+"""Tar files for WebDataset: the files of one sample have the same name before the first dot and follow each other.
 
 The same samples give the same bytes: times, owners and modes are fixed.
 """
@@ -19,7 +19,7 @@ MODE = 0o644
 
 
 class Member(NamedTuple):
-    """Where the bytes of a file stand in a tar file."""
+    """The place of the bytes of a file in a tar file."""
 
     start: int
     size: int
@@ -40,7 +40,7 @@ class TarWriter:
         self._tar = tarfile.TarFile(fileobj=self._file, mode="w", format=tarfile.USTAR_FORMAT)
 
     def add(self, key: str, files: Mapping[str, bytes]) -> None:
-        """Add the files of one sample by their endings, in alphabetical order, as WebDataset wants them."""
+        """Add the files of one sample by their endings, in alphabetical order, as WebDataset requires."""
         for ending in sorted(files):
             info = tarfile.TarInfo(f"{key}.{ending}")
             info.size, info.mode = len(files[ending]), MODE
@@ -60,7 +60,7 @@ class TarWriter:
 
 
 def read_members(path: Path) -> dict[str, Member]:
-    """Where each file of a tar file stands, by its name; only the headers are read.
+    """The place of each file of a tar file, by its name; only the headers are read.
 
     Raises:
         InputError: the file cannot be read, or is no tar file.
@@ -70,7 +70,7 @@ def read_members(path: Path) -> dict[str, Member]:
             with tarfile.TarFile(fileobj=file) as tar:
                 return {info.name: Member(info.offset_data, info.size) for info in tar if info.isreg()}
         except (tarfile.TarError, OSError, ValueError) as error:
-            raise InputError(f"{path}: is no tar file that can be read ({error})") from None
+            raise InputError(f"{path} is no tar file that can be read ({error})") from None
 
 
 def read_member(path: Path, member: Member) -> bytes:

@@ -1,4 +1,5 @@
-"""Distributions in a plan: where a scene file has a value, a plan may have a table that says how to draw it.
+"""Distributions in a plan: instead of a value of a scene file, a plan may have a table that states how to draw the
+value.
 
 A table with one of these names is a distribution:
 
@@ -6,8 +7,8 @@ A table with one of these names is a distribution:
 * ``{normal = [mean, deviation]}``: a number within three deviations of the mean;
 * ``{whole = [low, high]}``: a whole number, both ends included;
 * ``{choice = [a, b, ...], weights = [1, 2, ...]}``: one of the values, which may be tables; ``weights`` may be absent;
-* ``{repeat = 3, of = ...}``: a list of that many values, each drawn anew; the number may be a distribution, too;
-* ``{chance = 0.2, of = ...}``: the value, or with the rest of the chance no key at all.
+* ``{repeat = 3, of = ...}``: a list of this number of values, each drawn anew; the number may be a distribution, too;
+* ``{chance = 0.2, of = ...}``: the value with this chance, otherwise no key.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ Scalar = str | float | int | bool
 
 
 class Source(Protocol):
-    """What is needed of ``numpy.random.Generator``."""
+    """The methods of ``numpy.random.Generator`` that are used."""
 
     def random(self) -> float: ...
 
@@ -126,7 +127,9 @@ def check_distributions(value: Any, path: str) -> None:
     elif isinstance(value, list | tuple):
         for place, inner in enumerate(value):
             if distribution_kind(inner) == "chance":
-                raise CmpDesignError(f"{path}.{place}: chance has no place in a list; take repeat for a list")
+                raise CmpDesignError(
+                    f"{path}.{place}: chance is not allowed in a list; use repeat for a list"
+                )
             check_distributions(inner, f"{path}.{place}")
 
 
@@ -134,7 +137,7 @@ def _check_kind(kind: str, table: Mapping[str, Any], path: str) -> None:
     strange = sorted(table.keys() - {kind} - KINDS[kind])
     if strange:
         allowed = ", ".join([kind, *sorted(KINDS[kind])])
-        raise CmpDesignError(f"{path}: {strange[0]} has no place beside {kind}; there are {allowed}")
+        raise CmpDesignError(f"{path}: {strange[0]} is not allowed with {kind}; there are {allowed}")
     if "of" in KINDS[kind]:
         if "of" not in table:
             raise CmpDesignError(f"{path}: {kind} needs of, the value that is repeated or may be absent")
@@ -182,7 +185,7 @@ def _check_pair(kind: str, given: Any, path: str) -> None:
 
 
 def _whole_numbers(value: Any) -> list[int] | None:
-    """The extreme whole numbers that a value can be; None if it can be another value."""
+    """The smallest and the largest whole number of a value; None if the value can be of another kind."""
     if isinstance(value, int) and not isinstance(value, bool):
         return [value]
     match distribution_kind(value):
@@ -207,7 +210,7 @@ def _require(good: bool, path: str, key: str, value: object, limit: str) -> None
 def varying_leaves(value: Any, path: str = "", varies: bool = False) -> Iterator[tuple[str, Any]]:
     """(dotted path, an example or a type) of every scalar that differs from frame to frame, lists by their places.
 
-    What is repeated or may be absent as a list's entry has no fixed place: of a ``repeat`` there is the path with
+    Repeated values and entries that may be absent have no fixed place: for a ``repeat`` there is the path with
     ".count" alone.
 
     Yields:
@@ -234,7 +237,7 @@ def varying_leaves(value: Any, path: str = "", varies: bool = False) -> Iterator
 
 
 def value_at(document: Any, path: str) -> Any:
-    """The value at a dotted path of a drawn document; None where there is none; the length of a list at ".count"."""
+    """The value at a dotted path of a drawn document; None without a value; the length of a list at ".count"."""
     for part in path.split("."):
         if isinstance(document, Mapping):
             document = document.get(part)

@@ -41,8 +41,8 @@ class FrameRecord:
     Attributes:
         number: of the frame in the data set.
         design: name of the design.
-        redrawn: how many draws before could not be rendered.
-        document: the drawn scene; what a scene file would hold.
+        redrawn: number of earlier draws that could not be rendered.
+        document: the drawn scene, as in a scene file.
         image: the bytes of the encoded picture.
         size_px: (width, height).
         contact: forces and strain; None without an object.
@@ -91,7 +91,7 @@ class FrameMaker:
         return ReadableDesign(about["name"], reference, layout_from_reference(reference))
 
     def _reader(self, design: ReadableDesign, mirrored: bool, response: Any) -> Extractor:
-        """The reader that knows the side and the sensor's response; the last ones are kept."""
+        """The reader for a side and the sensor's response; the last readers are kept."""
         key = f"{design.name} {mirrored} {response}"
         if key not in self._readers:
             if len(self._readers) >= MOST_READERS:
@@ -119,7 +119,7 @@ class FrameMaker:
             except SceneError as error:
                 problem = str(error)
         raise PlanError(
-            f"frame {number}: none of {MOST_ATTEMPTS} draws can be rendered; the last one: {problem}; "
+            f"frame {number}: none of {MOST_ATTEMPTS} draws can be rendered; the last draw: {problem}; "
             "narrow the plan's ranges"
         )
 
@@ -151,7 +151,7 @@ class FrameMaker:
     def _read(
         self, design: ReadableDesign, image: bytes, scene: Scene, rendered: Rendered
     ) -> tuple[Markers, ...]:
-        """The markers of every view, from the encoded picture, as any later reader gets it."""
+        """The markers of every view, from the encoded picture."""
         if not self._plan["markers"]["read"]:
             return ()
         pixels = decode_bytes(image, "frame")

@@ -32,7 +32,7 @@ MOST_FRAMES = 10**9
 MOST_FRAMES_A_SHARD = 100_000
 TRIALS = 32  # documents that are drawn and checked, without solving or drawing, before the work begins
 NOT_IN_SCENE = {
-    "seed": "every frame has a seed of its own",
+    "seed": "every frame has its own seed",
     "sequence": "every frame of a data set is one picture",
 }
 
@@ -46,7 +46,7 @@ class _Table(BaseModel):
 
 
 class ImageTable(_Table):
-    """[image]: how a frame's picture is encoded."""
+    """[image]: the encoding of a frame's picture."""
 
     kind: Literal["jpeg", "png"] = Field(
         "jpeg", description="JPEG keeps the full resolution of color (4:4:4)."
@@ -55,7 +55,7 @@ class ImageTable(_Table):
 
 
 class MarkersTable(_Table):
-    """[markers]: whether and how the markers are read from the encoded picture."""
+    """[markers]: the reading of the markers from the encoded picture."""
 
     read: bool = True
     preset: Literal["fast", "balanced", "accurate"] = "balanced"
@@ -72,7 +72,7 @@ class PlanTable(_Table):
     designs: list[str] = Field(min_length=1, max_length=1000)
     weights: list[float] | None = None
     largest_strain: float | None = Field(
-        None, gt=0, description="Contacts of a larger strain are drawn anew; null: none."
+        None, gt=0, description="Contacts of a larger strain are drawn anew; null: no limit."
     )
     image: ImageTable = Field(default_factory=lambda: ImageTable.model_validate({}))
     markers: MarkersTable = Field(default_factory=lambda: MarkersTable.model_validate({}))
@@ -88,13 +88,13 @@ class PlanTable(_Table):
             )
         for name, reason in NOT_IN_SCENE.items():
             if name in self.scene:
-                raise ValueError(f"scene.{name} has no place in a plan: {reason}; leave it out")
+                raise ValueError(f"scene.{name} is not allowed in a plan: {reason}; leave it out")
         sensor = self.scene.get("sensor")
         if isinstance(sensor, Mapping) and self.image.kind == "jpeg":
             for key in {"jpeg_quality", "bits"} & sensor.keys():
                 if sensor[key] != 8:
                     raise ValueError(
-                        f'scene.sensor.{key} has no place beside image.kind = "jpeg", which compresses 8 bits; '
+                        f'scene.sensor.{key} is not allowed with image.kind = "jpeg", which compresses 8 bits; '
                         'leave it out, or take image.kind = "png"'
                     )
         return self
@@ -181,7 +181,7 @@ def _require_different_names(layouts: list[NamedLayout], path: Path) -> None:
     names = [each.name for each in layouts]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise PlanError(f"{path}: designs has two of the name {twice}; rename the file of one")
+        raise PlanError(f"{path}: designs has two designs of the name {twice}; rename one of the files")
 
 
 def _require_readable(layouts: list[NamedLayout], path: Path) -> None:
@@ -194,7 +194,7 @@ def _require_readable(layouts: list[NamedLayout], path: Path) -> None:
 
 
 def _take_inputs(scene: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """The scene with the paths of its height maps and pictures as they are in the data set, and these files."""
+    """The scene with the paths of its height maps and pictures in the data set, and these files."""
     taken: dict[str, bytes] = {}
     changed = copy.deepcopy(dict(scene))
     for table in _tables_with_path(changed):

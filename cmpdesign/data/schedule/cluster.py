@@ -1,7 +1,7 @@
-"""Work on a dask cluster, however it was started: by hand, over SSH, by SLURM, on Kubernetes.
+"""Work on a dask cluster that was started by hand, over SSH, by SLURM, or on Kubernetes.
 
-The scheduler gives the work of a lost worker to another one. What the work returns is small: shards are files in a
-folder that all workers see.
+The scheduler gives the work of a lost worker to another worker. The results of the work are small: shards are files in
+a folder that all workers can write.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def cluster_results(
         address: of the scheduler, as "tcp://10.0.0.1:8786", or the path of its scheduler file (.json).
 
     Raises:
-        CmpDesignError: the scheduler cannot be reached or went away, a worker has other versions or was lost too
-            often; or of the work.
+        CmpDesignError: the scheduler cannot be reached or was lost, a worker has other versions or was lost too
+            often; or an error of the work.
     """
     with extra("dask"):
         distributed: Any = import_module("distributed")
@@ -47,7 +47,7 @@ def cluster_results(
                 _Checked(work, installed_versions()), list(items), retries=RETRIES, pure=False, key=KEY
             )
             completed = distributed.as_completed(futures, loop=client.loop)
-            del futures  # a result that was taken is forgotten
+            del futures  # a result is dropped after its use
             for future in completed:
                 result = future.result()
                 future.release()
@@ -56,12 +56,12 @@ def cluster_results(
     except distributed.KilledWorker as error:
         raise CmpDesignError(
             f"a part of the work was lost with {error.allowed_failures + 1} workers one after another, {done} of "
-            f"{len(items)} parts are done; do the workers have the memory for it?"
+            f"{len(items)} parts are done; check the memory of the workers"
         ) from None
     except (distributed.client.FutureCancelledError, distributed.comm.CommClosedError, CancelledError):
         raise CmpDesignError(
-            f"the scheduler at {address} went away, {done} of {len(items)} parts are done; the same command goes on "
-            "with the others"
+            f"the scheduler at {address} was lost, {done} of {len(items)} parts are done; the same command continues "
+            "with the other parts"
         ) from None
 
 
@@ -110,7 +110,7 @@ def _thread_plugin() -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without the log of distributed, whose events are told in one line at the end."""
+    """Within this context, the log of distributed is off; its events are stated in one line at the end."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
     levels = {name: logging.getLogger(name).level for name in names}
     for name in names:

@@ -1,6 +1,6 @@
 """Work on all numbers of a data set: processes of this machine, or the workers of a dask cluster.
 
-Results come in the order of completion; none depends on it, nor on the number of workers.
+Results are returned in the order of completion; results do not depend on this order or on the number of workers.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Work = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Scheduler:
-    """Where the work is done.
+    """The workers.
 
     Attributes:
         address: of a dask scheduler, or the path of its scheduler file; "" for this machine.
@@ -52,7 +52,9 @@ def parse_scheduler(text: str, workers: int | None) -> Scheduler:
             "dask=scheduler.json"
         )
     if workers is not None:
-        raise CmpDesignError("workers has no place beside a dask scheduler, which has its own; leave it out")
+        raise CmpDesignError(
+            "workers is not allowed with a dask scheduler, which has its own workers; leave it out"
+        )
     return Scheduler(address)
 
 
@@ -63,7 +65,7 @@ def _usable_cores() -> int:
 
 
 def results(work: Work, items: Sequence[Any], scheduler: Scheduler) -> Generator[Any, None, None]:
-    """The result of every item, as they come.
+    """The result of every item, in the order of completion.
 
     Args:
         work: a function at the top of a module.
@@ -71,7 +73,8 @@ def results(work: Work, items: Sequence[Any], scheduler: Scheduler) -> Generator
         scheduler: where the work is done.
 
     Raises:
-        CmpDesignError: of the work; workers or the scheduler were lost. Work that has not begun is left.
+        CmpDesignError: an error of the work, or workers or the scheduler were lost. Work that has not begun is not
+            done.
     """
     if scheduler.address:
         return cluster_results(work, items, scheduler.address)
@@ -81,14 +84,14 @@ def results(work: Work, items: Sequence[Any], scheduler: Scheduler) -> Generator
 
 
 def _own_results(work: Work, items: Sequence[Any]) -> Generator[Any, None, None]:
-    """The work of one worker is done by this process."""
+    """This process does the work of one worker."""
     with one_thread():
         for item in items:
             yield work(item)
 
 
 def _local_results(work: Work, items: Sequence[Any], workers: int) -> Generator[Any, None, None]:
-    """A pool is gone with the first worker that is killed; the rest is done by another pool."""
+    """A killed worker ends its pool; another pool does the remaining work."""
     open_items, losses = list(range(len(items))), 0
     while open_items:
         before = len(open_items)
@@ -99,8 +102,8 @@ def _local_results(work: Work, items: Sequence[Any], workers: int) -> Generator[
         losses = losses + 1 if len(open_items) == before else 1
         if open_items and losses > MOST_LOSSES:
             raise CmpDesignError(
-                f"{losses} times a worker was killed from outside without a result, at the last time with "
-                f"{len(open_items)} parts left; is there memory for {workers} workers?"
+                f"{losses} times a worker was killed without a result, the last time with "
+                f"{len(open_items)} parts left; check that there is memory for {workers} workers"
             )
 
 

@@ -38,7 +38,7 @@ EXTRACTED = {
 
 @dataclass(frozen=True)
 class Reading:
-    """How frames are read; see ``extractor.Extractor``."""
+    """Options of the reader; see ``extractor.Extractor``."""
 
     preset: Preset = "balanced"
     response: Literal["srgb", "linear"] | float | None = None
@@ -51,9 +51,9 @@ class SourceTask:
     """A source to be cut.
 
     Attributes:
-        name: as it was given.
+        name: name as given.
         paths: one video, or pictures.
-        frames_a_shard: smallest number of frames of a piece, but for the last.
+        frames_a_shard: smallest number of frames of a piece, except for the last piece.
     """
 
     name: str
@@ -62,10 +62,10 @@ class SourceTask:
 
 
 def name_tasks(sources: Sequence[str], frames_a_shard: int) -> list[SourceTask]:
-    """The sources that texts name; each text is a source of its own, and a pattern of videos one for each.
+    """The sources that texts name; each text is a separate source, and a pattern of videos one source for each video.
 
     Raises:
-        SourceError: a text names nothing, a camera or a stream.
+        SourceError: a text names no file, a camera or a stream.
     """
     tasks = []
     for named in (named for text in sources for named in name_sources([text])):
@@ -77,7 +77,7 @@ def name_tasks(sources: Sequence[str], frames_a_shard: int) -> list[SourceTask]:
 
 
 def index_source(task: SourceTask) -> dict[str, Any]:
-    """A source in plan.json: its digest, and the pieces that it is cut into as [first, frames, start, end].
+    """A source in plan.json: its digest, and its pieces as [first, frames, start, end].
 
     Raises:
         CmpDesignError: the source cannot be read.
@@ -122,10 +122,10 @@ def prepare_extraction(layout: Reference, sources: Sequence[Mapping[str, Any]], 
 
 
 def range_rows(folder: Path, plan: Mapping[str, Any], number: int) -> list[Row]:
-    """The rows of one shard: every frame read by itself, without the frames before it.
+    """The rows of one shard: every frame is read independently of the other frames.
 
     Raises:
-        CmpDesignError: the source is not what it was when it was cut.
+        CmpDesignError: the source was changed after it was cut.
     """
     source, piece = _piece(plan, number)
     extractor = _extractor(folder / LAYOUT, Reading(**plan["reading"]))
@@ -149,7 +149,7 @@ def _piece(plan: Mapping[str, Any], number: int) -> tuple[Mapping[str, Any], Pie
         if number < len(source["ranges"]):
             return source, Piece(*source["ranges"][number])
         number -= len(source["ranges"])
-    raise CmpDesignError(f"there is no shard {number} more")
+    raise CmpDesignError(f"shard {number} does not exist")
 
 
 @lru_cache(maxsize=2)

@@ -1,6 +1,6 @@
-"""Videos cut at key frames: where they can be cut, and the frames of one piece, decoded from its key frame on.
+"""Videos cut at key frames: the places of the cuts, and the frames of one piece, decoded from its key frame on.
 
-A piece is the frames whose time stamps lie from the key frame's to the next piece's. Time stamps are those of the
+A piece has the frames whose time stamps lie from the key frame's to the next piece's. Time stamps are those of the
 file's packets, in units of the stream's time base; a frame that cannot be decoded still has one.
 """
 
@@ -23,7 +23,9 @@ END = 1 << 62  # of the last piece
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a source: frames from ``first`` on; ``start`` and ``end`` are time stamps of a video that has some."""
+    """A part of a source: frames from ``first`` on; ``start`` and ``end`` are time stamps of a video, if there are
+    any.
+    """
 
     first: int
     frames: int
@@ -108,7 +110,7 @@ def _stamped_frames(path: Path, piece: Piece) -> Iterator[_Decoded]:
         stream = container.streams.video[0]
         if piece.start != START:
             _seek(container, stream, piece.start)
-        waiting: list[int] = []  # stamps whose frame has not come yet
+        waiting: list[int] = []  # stamps whose frame has not been decoded yet
         for packet in chain(_packets(container), [None]):  # None: the last frames that the decoder holds
             if packet is not None and packet.pts is not None and piece.start <= packet.pts < piece.end:
                 bisect.insort(waiting, packet.pts)
@@ -136,7 +138,7 @@ def _unstamped_frames(path: Path) -> Iterator[_Decoded]:
 
 
 def _seek(container: Any, stream: Any, start: int) -> None:
-    """Go to the key frame of a stamp, or before it; to the beginning of a file that cannot be sought in."""
+    """Go to the key frame of a stamp, or before; to the beginning of a file without random access."""
     with extra("data"):
         import av
 
@@ -150,7 +152,7 @@ def _seek(container: Any, stream: Any, start: int) -> None:
 
 
 def _packets(container: Any) -> Iterator[Any]:
-    """The packets with frames that are shown, up to where the file is damaged."""
+    """The packets with frames that are shown, up to the first damage of the file."""
     with extra("data"):
         import av
 
@@ -185,7 +187,7 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         container = av.open(str(path))
     except (av.FFmpegError, OSError, ValueError) as error:
-        raise SourceError(f"{path}: is no video that can be read ({_reason(error)})") from None
+        raise SourceError(f"{path} is no video that can be read ({_reason(error)})") from None
     with container:
         if not container.streams.video:
             raise SourceError(f"{path}: holds no video")

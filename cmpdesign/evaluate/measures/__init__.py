@@ -1,4 +1,4 @@
-"""What the experiments measure: single cells, edges, the pressed cube, reconstructed shapes.
+"""Measures of the experiments: single cells, edges, the pressed cube, reconstructed shapes.
 
 In: pictures, markers or surfaces. Out: figures.
 """

@@ -38,7 +38,7 @@ def measure_reconstruction(
         area; ``covered``, the share of that grid where the pattern gives a surface; ``marker_rms_mm`` and
         ``marker_median_mm`` of the markers' positions; ``measured``, the share of the visible markers with a position;
         ``over_sigma``, the RMS of the positions' errors in units of their stated covariance, and
-        ``over_sigma_median``, the normalised median (both 1 for a true covariance). Values are None where nothing
+        ``over_sigma_median``, the normalised median (both 1 for a true covariance). Values are None where no marker
         was read, or the pattern cannot be read even at rest.
     """
     try:

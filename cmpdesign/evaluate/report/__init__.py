@@ -1,4 +1,4 @@
-"""How figures are shown: statistics, plots and an HTML page.
+"""Presentation of figures: statistics, plots and an HTML page.
 
 In: figures. Out: texts.
 """

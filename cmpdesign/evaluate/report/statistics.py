@@ -42,7 +42,7 @@ class SuccessShare:
 
 
 def wilson_interval(successful: int, trials: int, z: float = Z_95) -> tuple[float, float]:
-    """Wilson's score interval of a binomial share; (0, 1) where nothing was tried.
+    """Wilson's score interval of a binomial share; (0, 1) without trials.
 
     Source: E. B. Wilson, Probable inference, the law of succession, and statistical inference, JASA 22 (1927).
     """

@@ -1,4 +1,4 @@
 """A simulated sensor: its file, its conditions, its contacts, and the instrument that reads its pictures.
 
-In: a sensor's TOML and a design. Out: what the sensor measures, beside the truth.
+In: a sensor's TOML and a design. Out: the sensor's measurements, and the truth.
 """

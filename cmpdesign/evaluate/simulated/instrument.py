@@ -133,14 +133,14 @@ class Instrument:
         if self.reader == "colors":
             from extractor import Extractor
 
-            # a sensor of any design may look at either side of it
+            # a design may have its front or its back towards the sensor
             extract = Extractor(self.reference, self.preset, self.sensor.response, "either").extract
             return [extract] * len(self.sensor.rig.views)
         return [_make_square_reader(self, view) for view in self.sensor.rig.views]
 
 
 def _make_square_reader(instrument: Instrument, view: View) -> Callable[[NDArray[Any]], Markers]:
-    """A square pattern's reader for one view; the direction of its rows is known from rest."""
+    """A square pattern's reader for one view; the direction of the rows is known from the picture at rest."""
     from cmpdesign.evaluate.square.contour_reader import SquareReader
     from cmpdesign.evaluate.square.saddle_reader import SaddleReader
 

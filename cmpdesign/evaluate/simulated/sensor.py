@@ -160,7 +160,7 @@ class SimulatedSensor:
 
     @property
     def response(self) -> SensorResponse:
-        """How light becomes the picture's values, as a scene's sensor has it."""
+        """The relation of light and the picture's values, as of a scene's sensor."""
         return cast(SensorResponse, self.table.response)
 
     @cached_property
@@ -213,7 +213,7 @@ class SimulatedSensor:
 
 
 def find_sensor(name_or_path: str | Path) -> Path:
-    """The file of a shipped sensor, or of a path.
+    """The file of a sensor template, or of a path.
 
     Raises:
         SensorError: neither.

@@ -37,7 +37,7 @@ class SquareReader:
         layout: a square pattern.
         edge_px: the edges' length at rest.
         axes_px: (2, 2) unit vectors in the image at rest: the direction of ascending columns, then of ascending rows.
-        response: the camera's response, as a scene's sensor has it; corners are refined in light.
+        response: the camera's response, as of a scene's sensor; corners are refined in light.
     """
 
     layout: Layout

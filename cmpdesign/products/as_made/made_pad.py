@@ -1,4 +1,4 @@
-"""The pad that a product makes: the outlines of its cells at the seen side, and what makes them differ."""
+"""The pad that a product makes: the outlines of its cells at the seen side, and the causes of their deviations."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from cmpdesign.layout.layout import DECIMALS, AsMade, Layout, equal_length_outli
 from cmpdesign.layout.side import seen_side
 
 Points = NDArray[np.float64]
-# Decimals in mm of places that were read in a picture: the digits that every run of a machine agrees on.
+# Decimals in mm of places that were read in a picture: these digits are the same in every run on a machine.
 READ_DECIMALS = 5
-# A rounded corner moves no marker by more than this share of what it loses (read in pictures of all patterns): the
-# corners of the cells around a marker lose alike. A side that is moved moves its markers by as much.
+# A rounded corner moves a marker by at most this share of the lost length (read in pictures of all patterns): the
+# corners of the cells around a marker lose the same length. A moved side moves its markers by the same distance.
 CORNER_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A parameter by which made cells differ from the nominal ones, and by how far at most it moves a marker, mm."""
+    """A parameter that changes the made cells, and the largest distance by which it moves a marker, mm."""
 
     parameter: str
     effect_mm: float
@@ -49,7 +49,7 @@ class MadePad:
 
     @property
     def main_cause(self) -> str:
-        """The parameter with the largest effect; empty if there is none."""
+        """The parameter with the largest effect; empty without parameters."""
         largest = max(self.causes, key=lambda cause: cause.effect_mm, default=Cause("", 0.0))
         return largest.parameter if largest.effect_mm > 0 else ""
 
@@ -68,7 +68,7 @@ class MadePad:
         }
 
     def with_markers(self, xy_mm: Points) -> MadePad:
-        """The pad with markers where they are read; (M, 2) mm, NaN where a marker is not read and stays nominal."""
+        """The pad with markers at the read places; (M, 2) mm, NaN: the marker is not read and has its nominal place."""
         places = np.where(np.isfinite(xy_mm), np.round(xy_mm, READ_DECIMALS), self.nominal.marker_xy_mm) + 0.0
         return replace(self, layout=replace(self.layout, marker_xy_mm=places))
 
@@ -86,8 +86,8 @@ def make_pad(
         layout: the nominal layout.
         product: name of the product.
         outlines_mm: (K, 2) outline of each cell that is not black, in the layout's order and frame.
-        causes: what the outlines differ by.
-        variance_mm2: of the markers' places from pad to pad, per axis; None where not known.
+        causes: parameters that change the outlines.
+        variance_mm2: variance of the markers' places between pads, per axis; None where not known.
     """
     counter_clockwise = [ring if _signed_area_mm2(ring) >= 0 else ring[::-1] for ring in outlines_mm]
     outlines = np.round(equal_length_outlines(counter_clockwise), DECIMALS) + 0.0
@@ -99,10 +99,11 @@ def make_pad(
 
 
 def cut_by_later(outlines_mm: Sequence[Points]) -> list[Points]:
-    """What stays of each cell when the cells are made one after the other, and a later cell replaces earlier ones.
+    """The remaining part of each cell when the cells are made one after the other, and a later cell replaces earlier
+    cells.
 
     Args:
-        outlines_mm: (K, 2) outlines in the order of making; what one runs around twice belongs to the cell.
+        outlines_mm: (K, 2) outlines in the order of making; an area that an outline encloses twice belongs to the cell.
 
     Returns:
         The outline of each cell's largest part.

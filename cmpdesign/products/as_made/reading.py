@@ -25,15 +25,16 @@ FILL_SHARE = 0.94
 # A camera in focus blurs an edge by about a pixel (standard deviation).
 BLUR_PX = 0.8
 MIN_SHARE = 0.98
-# Largest deviation of a marker, in pitches, that no warning is given for.
+# Largest deviation of a marker, in pitches, without a warning.
 WARNING_PITCHES = 0.02
-# A pattern with this many colored cells is numbered however a clip cuts it: all that failed had fewer than ten.
+# A pattern with this number of colored cells is numbered with any clip outline: all patterns that failed had fewer than
+# ten.
 CERTAIN_CELLS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class PadReading:
-    """What the extractor reads of a made pad, against the nominal layout.
+    """The extractor's reading of a made pad, compared with the nominal layout.
 
     Attributes:
         share: measured markers over visible markers.
@@ -56,7 +57,7 @@ class PadReading:
         return self.worst_px / self.pitch_px
 
     def figures(self) -> dict[str, Any]:
-        """Share, side, and the deviations in px, mm and pitches; None where nothing was measured."""
+        """Share, side, and the deviations in px, mm and pitches; None where no marker was measured."""
         scales = {"px": 1.0, "mm": self.pitch_mm / self.pitch_px, "pitch": 1 / self.pitch_px}
         found: dict[str, Any] = {"measured_share": round(self.share, 6), "side_seen": self.side_seen}
         for name, value in (("rms", self.rms_px), ("worst", self.worst_px)):
@@ -79,7 +80,7 @@ class PadReading:
 
 
 def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX, preset: Preset = "balanced") -> PadReading:
-    """Draw a made pad as a camera sees it that the pad fills, and read the picture with the nominal layout.
+    """Draw a camera's picture that a made pad fills, and read the picture with the nominal layout.
 
     The picture has no noise, so the deviations are systematic.
 
@@ -131,7 +132,7 @@ class PadReadings:
 def read_pads(
     pads: Iterable[MadePad], camera_px: tuple[int, int] = CAMERA_PX, preset: Preset = "balanced"
 ) -> PadReadings:
-    """Read pads; a pad whose cells are no triangles is not read, and its markers stay nominal."""
+    """Read pads; a pad whose cells are no triangles is not read, and its markers have nominal places."""
     from cmpdesign.files.layout_json import layout_to_json
 
     found = PadReadings({}, [], {}, {})
@@ -149,7 +150,7 @@ def read_pads(
 
 
 def reading_findings(pad: MadePad, reading: PadReading) -> list[Finding]:
-    """Errors where too little or the wrong side is read; a warning where markers deviate."""
+    """Errors where too few markers or the wrong side are read; a warning where markers deviate."""
     name, cause = pad.product, pad.main_cause
     designed = seen_side(pad.nominal.mirrored)
     if reading.side_seen is not None and reading.side_seen != designed:

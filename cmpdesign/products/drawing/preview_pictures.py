@@ -1,4 +1,6 @@
-"""The arrangement of products' pictures around the preview's drawing: tall ones right of it, others below."""
+"""The arrangement of products' pictures around the preview's drawing: tall pictures right of the drawing, others
+below.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The geometry that a job leaves at both faces: areas, corners and webs, from the beam swept over the paths."""
+"""The geometry after a job at both faces: areas, corners and webs, from the beam swept over the paths."""
 
 from __future__ import annotations
 
@@ -96,14 +96,14 @@ def made_pad(job: LaserJob) -> MadePad:
 def drawn_outlines_mm(laser_pass: LaserPass, job: LaserJob) -> Points:
     """(N, P, 2) outlines of a pass' cavities at the side that the camera sees, in the bed's frame, with fewer points.
 
-    Paths that are not compensated have no arcs: the shop makes the outlines what they are.
+    Paths that are not compensated have no arcs: the shop compensates the kerf.
     """
     burnt = burnt_cell_outlines_mm(laser_pass, job.seen)
     return _fewer_points(burnt) if job.setup.compensated else burnt
 
 
 def _fewer_points(outlines: Points) -> Points:
-    """(N, P, 2) outlines with fewer points on their arcs; the ends of the arcs and of the sides stay."""
+    """(N, P, 2) outlines with fewer points on their arcs; the ends of the arcs and of the sides are kept."""
     kept = np.array([0, *range(1, ARC_POINTS + 1, ARC_STRIDE), ARC_POINTS + 1])
     corners = outlines.shape[1] // (ARC_POINTS + 2)
     every: Points = outlines[:, (np.arange(corners)[:, None] * (ARC_POINTS + 2) + kept).ravel()]
@@ -154,14 +154,14 @@ def corner_losses_mm(cavities: Cavities, outlines: Points) -> NDArray[np.float64
     corners = cavities.nominal_mm.shape[1]
     arcs = outlines.reshape(len(outlines), corners, -1, 2)
     gap = np.linalg.norm(arcs - cavities.nominal_mm[:, :, None], axis=-1).min(axis=2)
-    # A burn that passes the corner along the spur leaves no loss.
+    # A burn that passes the corner along the spur has no loss.
     outward = cavities.nominal_mm - cavities.path_mm
     past = ((arcs - cavities.nominal_mm[:, :, None]) * outward[:, :, None]).sum(axis=-1).max(axis=2) > 0
     return np.where(past, 0.0, gap)
 
 
 def burnt_reach_beside_mm(cavities: Cavities, outlines: Points) -> NDArray[np.float64]:
-    """(N,) largest distance by which each burnt outline exceeds its cell's sides; negative if it stays inside."""
+    """(N,) largest distance by which each burnt outline exceeds its cell's sides; negative inside the cell."""
     start = cavities.nominal_mm
     side = np.roll(start, -1, axis=1) - start
     outward = np.stack([side[..., 1], -side[..., 0]], axis=-1) / np.linalg.norm(side, axis=-1, keepdims=True)

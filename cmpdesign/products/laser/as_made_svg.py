@@ -1,7 +1,8 @@
-"""as-made.svg: the pattern as the laser leaves it at the side that the camera sees, filled with ink, at true size.
+"""as-made.svg: the pattern as carved, at the side that the camera sees, filled with ink, at true size.
 
-The drawing is not mirrored: it shows the front's x to the right. It is built like ``pattern.svg``, so that programs can
-compare and render it and the extractor can read it.
+The drawing is not mirrored: the front's x points to the right. The file has the structure of ``pattern.svg``, so that
+    programs can
+compare and render the drawing and the extractor can read the rendering.
 """
 
 from __future__ import annotations

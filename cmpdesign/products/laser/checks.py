@@ -40,7 +40,7 @@ def setup_findings(design: Design, job: LaserJob) -> Iterator[Finding]:
     texts = [name for name in ("print_ids", "print_scale") if getattr(design, name)]
     if texts:
         remedy = f"a laser burns outlines only; leave {' and '.join(texts)} out"
-        yield _error_finding("texts asked for", len(texts), 0, "", remedy)
+        yield _error_finding("texts in the job", len(texts), 0, "", remedy)
     speed_max = setup.machine.speed_max_mm_s.value
     if max(setup.speed_mm_s, setup.cut_speed_mm_s) > speed_max:
         speed = max(setup.speed_mm_s, setup.cut_speed_mm_s)
@@ -71,7 +71,7 @@ def setup_findings(design: Design, job: LaserJob) -> Iterator[Finding]:
         if len(lost):
             remedy = f"cell {int(lost[0])} is among them; make pitch_mm larger or the kerf smaller"
             yield _error_finding(
-                f"cells of {laser_pass.name} that the kerf leaves nothing of", len(lost), 0, "", remedy
+                f"cells of {laser_pass.name} that are narrower than the kerf", len(lost), 0, "", remedy
             )
 
 
@@ -152,7 +152,7 @@ def count_open_paths(strokes: Strokes) -> int:
 
 
 def _hole_findings(job: LaserJob) -> Iterator[Finding]:
-    """A beam cannot burn a round hole that is more sharply curved than its footprint: the path turns inside out."""
+    """A beam cannot burn a round hole that is more sharply curved than its footprint: the path has no inside."""
     diameter, limit = job.layout.fiducial_diameter_mm, job.front.smallest_hole_mm
     if job.setup.options.holes and len(job.fiducials_mm) and diameter <= limit:
         remedy = "make fiducials.diameter_mm larger, the kerf smaller, or leave the holes out (laser.holes = false)"
@@ -190,7 +190,9 @@ def _spacing_findings(job: LaserJob) -> Iterator[Finding]:
 
 def _web_findings(subject: str, face: FaceFigures, limit: float, burn_limit: float) -> Iterator[Finding]:
     if face.web_mm is not None and face.web_mm < limit:
-        remedy = "make pitch_mm larger, the kerf smaller, or laser.minimum_web_mm if thinner walls hold"
+        remedy = (
+            "make pitch_mm larger, the kerf smaller, or laser.minimum_web_mm if thinner walls do not break"
+        )
         yield _error_finding(f"smallest web of {subject}", face.web_mm, limit, "mm", remedy)
     if face.web_to_filled_mm is not None and -face.web_to_filled_mm > burn_limit:
         remedy = 'choose laser.corner = "plain" or laser.face = "front"'

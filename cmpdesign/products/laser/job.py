@@ -116,7 +116,7 @@ class LaserJob:
 
     @property
     def nominal_face(self) -> Face:
-        """Where cells have their nominal size: the design's face, else the side that the camera sees."""
+        """The face at which cells have their nominal size: the design's face, else the side that the camera sees."""
         return nominal_face(self.layout, self.setup)
 
     @property
@@ -142,7 +142,7 @@ class LaserJob:
 
 
 def nominal_face(layout: Layout, setup: LaserSetup) -> Face:
-    """Where cells have their nominal size, see ``LaserJob.nominal_face``."""
+    """The face at which cells have their nominal size, see ``LaserJob.nominal_face``."""
     return setup.options.face or seen_side(layout.mirrored)
 
 
@@ -182,7 +182,7 @@ def make_job(name: str, layout: Layout, setup: LaserSetup) -> LaserJob:
 def cell_groups(layout: Layout) -> list[CellGroup]:
     """Group the colored cells into passes, in burning order; black cells are the ground.
 
-    Cells of one color that touch at a corner (square pattern) get different parts, so that every pass leaves whole
+    Cells of one color that touch at a corner (square pattern) get different parts, so that every pass leaves complete
     walls between its cavities.
     """
     groups: list[CellGroup] = []

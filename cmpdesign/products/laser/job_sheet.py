@@ -27,10 +27,10 @@ ol { margin: 1mm 0; padding-left: 6mm } small { color: #5c5650 }
 """
 
 _CORNERS = {
-    "plain": "Plain corners: the beam leaves up to half a kerf of every 60 degree corner; cells come out smaller by "
-    "that (2.05 r² a triangle, r being half the kerf).",
-    "overcut": "Overcut corners: a short spur runs into every corner and burns beside the cell just as much area as "
-    "it leaves at the tip; cells keep their area. Choose plain where the neighbour must not be touched.",
+    "plain": "Plain corners: the beam leaves up to half a kerf of every 60 degree corner; cells are smaller by "
+    "this area (2.05 r² a triangle, r being half the kerf).",
+    "overcut": "Overcut corners: a short spur runs into every corner. The area burnt beside the cell equals the area "
+    "left at the tip; cells keep their area. Choose plain where the neighbour must not be touched.",
 }
 
 
@@ -82,7 +82,7 @@ def _warning_html(job: LaserJob) -> str:
     names = escape(", ".join(job.setup.assumed))
     return (
         f'<div class="warn"><b>Not measured yet:</b> {names}. Cut <code>coupon</code> in this material first, '
-        "photograph it, and let <code>cmpdesign kerf</code> read it.</div>"
+        "photograph the coupon, and read the photo with <code>cmpdesign kerf</code>.</div>"
     )
 
 
@@ -92,7 +92,7 @@ def _uncompensated_html(job: LaserJob) -> str:
     return (
         '<div class="warn"><b>Not compensated for the kerf</b> (laser.kerf_mm = 0): paths are the nominal outlines. '
         "Set the compensation in the laser's program: half the kerf inward for cells and holes, outward for the pad's "
-        "outline. Burnt as they are, cells and holes come out one kerf too wide.</div>"
+        "outline. Without this compensation, cells and holes are one kerf too wide.</div>"
     )
 
 
@@ -114,7 +114,7 @@ def _facts_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
         else f"{setup.options.mode}, {setup.depth_mm:g} mm deep",
         "Kerf": f"front {_format_kerf(job.front.kerf_mm)}, back {_format_kerf(job.back.kerf_mm)} (cuts "
         f"along y, along x); "
-        f"walls lean by {setup.taper_deg:g}°"
+        f"walls have a taper of {setup.taper_deg:g}°"
         if setup.compensated
         else "not compensated: paths are the nominal outlines",
         "On the bed": f"{extent.right - extent.left:.2f} x {extent.top - extent.bottom:.2f} mm, "
@@ -151,7 +151,7 @@ def _passes_html(job: LaserJob, timings: tuple[PassTiming, ...]) -> str:
 
 def _after_pass_text(laser_pass: LaserPass) -> str:
     if laser_pass.kind == "holes":
-        return "put pins in; they stay to the end"
+        return "put the pins in; the pins stay until the end"
     if laser_pass.kind == "outline":
         return "take the pad out, done"
     assert laser_pass.color is not None
@@ -220,7 +220,7 @@ def _as_made_html(figures: tuple[PassFigures, ...]) -> str:
         rows += [_as_made_row(one_pass.name if side == "front" else "", side, face) for side, face in faces]
     return (
         f"<table>{head}{''.join(rows)}</table><p><small>Lengths in mm; areas against the nominal cells. A web to "
-        "filled cells of 0 means that they meet, a negative one that the burn runs into the cured cell.</small></p>"
+        "filled cells of 0 means that the cells meet; below 0, the burn runs into the cured cell.</small></p>"
     )
 
 
@@ -242,13 +242,14 @@ def _registration_html(job: LaserJob) -> str:
         for number, (x, y) in enumerate(job.fiducials_mm.tolist(), start=1)
     )
     holes = (
-        f"Pass 0 cuts them as pin holes of {diameter}."
+        f"Pass 0 cuts the fiducials as pin holes of {diameter}."
         if job.setup.options.holes
-        else f"They are marks of {diameter} that the pad must carry already (laser.holes = false)."
+        else f"The fiducials are marks of {diameter} that the pad must already have (laser.holes = false)."
     )
     return (
-        f"<p>{holes} They stand in layout.json and in every file (LightBurn: tool layer T1, never burnt), at the same "
-        f"place on the bed in every pass. They lie in three corners, so that a turned pad does not fit.</p>"
+        f"<p>{holes} The fiducials are in layout.json and in every file (LightBurn: tool layer T1, never burnt), at "
+        "the same "
+        f"place on the bed in every pass. They are in three corners, so that a turned pad does not fit.</p>"
         f"<table><tr><th>Fiducial</th><th class=n>X mm</th><th class=n>Y mm</th></tr>{rows}</table>"
     )
 

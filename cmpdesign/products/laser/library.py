@@ -53,7 +53,8 @@ class Machine(_StrictModel):
 class Settings(_StrictModel):
     """The settings of one machine for one material.
 
-    Kerf is the full width at the front: ``kerf_x_mm`` of cuts along y, ``kerf_y_mm`` of cuts along x.
+    Kerf is the full width at the front: ``kerf_x_mm`` of cuts along y, ``kerf_y_mm`` of cuts along x. The settings of
+    pockets are needed for jobs with mode = "pocket" only.
     """
 
     kerf_x_mm: Sourced[Length]
@@ -62,9 +63,9 @@ class Settings(_StrictModel):
     cut_power_percent: Sourced[Percent]
     cut_speed_mm_s: Sourced[Positive]
     cut_passes: Sourced[Count]
-    pocket_power_percent: Sourced[Percent]
-    pocket_speed_mm_s: Sourced[Positive]
-    pocket_depth_per_pass_mm: Sourced[Length]
+    pocket_power_percent: Sourced[Percent] | None = None
+    pocket_speed_mm_s: Sourced[Positive] | None = None
+    pocket_depth_per_pass_mm: Sourced[Length] | None = None
 
 
 class Material(_StrictModel):
@@ -80,17 +81,17 @@ class Material(_StrictModel):
 
 
 def machines() -> dict[str, Path]:
-    """The TOML file of every shipped machine, by name."""
+    """The TOML file of every machine template, by name."""
     return {path.stem: path for path in sorted((templates_folder() / "machines").glob("*.toml"))}
 
 
 def materials() -> dict[str, Path]:
-    """The TOML file of every shipped material, by name."""
+    """The TOML file of every material template, by name."""
     return {path.stem: path for path in sorted((templates_folder() / "materials").glob("*.toml"))}
 
 
 def load_machine(name_or_path: str) -> Machine:
-    """Load a shipped machine by name, or a machine from a TOML file.
+    """Load a machine template by name, or a machine from a TOML file.
 
     Raises:
         DesignError: unknown machine, or a file that does not describe a machine.
@@ -99,7 +100,7 @@ def load_machine(name_or_path: str) -> Machine:
 
 
 def load_material(name_or_path: str) -> Material:
-    """Load a shipped material by name, or a material from a TOML file.
+    """Load a material template by name, or a material from a TOML file.
 
     Raises:
         DesignError: unknown material, or a file that does not describe a material.
@@ -108,7 +109,7 @@ def load_material(name_or_path: str) -> Material:
 
 
 def settings_on(material: Material, machine_name: str) -> Settings:
-    """The material's settings on a machine; a machine's TOML file counts by its stem.
+    """The material's settings on a machine; the name of a machine's TOML file is its stem.
 
     Raises:
         DesignError: the material has no settings for this machine.

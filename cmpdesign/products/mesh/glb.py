@@ -1,4 +1,4 @@
-"""GLB (binary glTF 2.0): named, colored triangle meshes in metres, y up, as the format demands."""
+"""GLB (binary glTF 2.0): named, colored triangle meshes in metres, y up, as defined by the format."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The mold and the pad as build123d objects, to go on from in CAD: a flange, a camera mount, a housing.
+"""The mold and the pad as build123d objects, for further design in CAD: a flange, a camera mount, a housing.
 
-build123d belongs to the extra [cad]. The plain build does not use it: the kernel's
-exporter takes several times as long as ``step``, and the assemblies that it writes differ from run to run.
+build123d belongs to the extra [cad]. ``build`` does not use build123d: the kernel's
+exporter takes several times as long as ``step``, and its assemblies differ from run to run.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, make
 def mold_parts(design: Design, layout: Layout | None = None) -> Any:
     """Build the parts of a design's mold.
 
-    Every part lies where it is used, in mm: z = 0 is the back of the pad, and boss plates are turned over. Plates and
-    stencils of different colors are used one after the other, so that they take the same place. Dowels are "pin-1",
+    Every part is at its place of use, in mm: z = 0 is the back of the pad, and boss plates are turned over. Plates and
+    stencils of different colors are used one after the other and therefore have the same place. Dowels are "pin-1",
     "pin-2" and so on; the other labels are the names of the STEP files ("base", "boss-red").
 
     Args:
@@ -53,7 +53,7 @@ def mold_parts(design: Design, layout: Layout | None = None) -> Any:
 
 
 def pad_parts(design: Design, layout: Layout | None = None) -> Any:
-    """Build the silicone layers of a design's pad, cured, each as a whole without its cavities.
+    """Build the silicone layers of a design's pad, cured, each without its cavities.
 
     Args:
         design: the design.
@@ -86,7 +86,7 @@ def _placed_solids(part: Part) -> Iterator[_PlacedSolid]:
         yield _PlacedSolid(part.name, part.color, part.solid, (0.0, 0.0, part.z_mm), part.turned)
         return
     for number, (x, y) in enumerate(part.stack.pins_mm.tolist(), start=1):
-        # Each dowel is a shape of its own: exporters give a shape that is used twice one label.
+        # Each dowel is a separate shape: exporters give a shape that is used twice one label.
         dowel = replace(part).solid
         yield _PlacedSolid(f"{part.name}-{number}", part.color, dowel, (x, y, part.z_mm))
 

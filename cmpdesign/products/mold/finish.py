@@ -23,7 +23,7 @@ VOLUME_TOLERANCE = 1e-9
 
 
 class MoldError(CmpDesignError):
-    """A solid or mesh of a part is not as computed; no file was written."""
+    """A solid or mesh of a part differs from the computed figures; no file was written."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def finish_parts(design: Design, layout: Layout, parts: Sequence[Part]) -> dict[
 
 
 def finish_named_parts(design: Design, layout: Layout, names: Sequence[str]) -> Iterator[FinishedPart]:
-    """As ``finish_parts`` in this process, for the parts of these names, one after the other."""
+    """``finish_parts`` in this process, for the parts of these names, one after the other."""
     parts = {part.name: part for part in make_parts(make_stack(design, layout))}
     for name in names:
         yield finish_part(parts[name])
@@ -75,7 +75,7 @@ def check_part(part: Part) -> dict[str, Any]:
     if not measures.valid or not measures.closed or error > VOLUME_TOLERANCE:
         state = "closed" if measures.closed else "open"
         raise MoldError(
-            f"mold: {part.name} came out {'valid' if measures.valid else 'invalid'}, {state}, with a "
+            f"mold: the solid of {part.name} is {'valid' if measures.valid else 'invalid'}, {state}, with a "
             f"volume off by {error:.2g} of its own, limit {VOLUME_TOLERANCE:g}; this is a fault of "
             "cmpdesign, please report it"
         )

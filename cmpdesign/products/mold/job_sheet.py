@@ -46,7 +46,7 @@ def job_sheet_html(name: str, stack: MoldStack, parts: Sequence[Part], findings:
 
 
 def _side_text(stack: MoldStack) -> str:
-    """Where the camera looks from, which layer must be clear, and how the pad widens."""
+    """The camera's side, the layer that must be clear, and the widening of the pad."""
     seen = seen_side(stack.layout.mirrored)
     base, _, cover = (silicone.name for silicone in stack.silicones)
     sizes = pad_sizes_mm(stack)
@@ -54,7 +54,7 @@ def _side_text(stack: MoldStack) -> str:
     lies = "as designed" if seen == "back" else "turned over"
     return (
         f"The camera sees the pattern's {seen}, through the base layer: {base} must be clear and without pigment; the "
-        f"cover ({cover}) may be pigmented. Seen from above, the pattern lies {lies}. Walls lean by "
+        f"cover ({cover}) may be pigmented. Seen from above, the pattern lies {lies}. Walls have a draft of "
         f"{stack.options.draft_deg:g} degrees, so the pad widens from {narrow} at its back to {wide} at the cover."
     )
 

@@ -1,4 +1,4 @@
-"""The pad that comes out of a mold, at the base layer, where the camera sees it, at cured size."""
+"""The pad as cast in a mold, at the base layer, which the camera sees, at cured size."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cmpdesign.products.mold.stack.stack import MoldStack
 
 # A loop's arcs in the made pad: chords of this angle stay within a micrometre of an arc of 0.1 mm radius.
 CHORD_DEG = 15.0
-# Plates whose places a marker's place is the mean of: red, green and blue.
+# A marker's place is the mean of the places of these plates: red, green and blue.
 PLATES_AT_A_MARKER = 3
 
 
@@ -34,7 +34,7 @@ def made_pad(layout: Layout, stack: MoldStack) -> MadePad:
         ]
         outlines |= dict(zip(cells, rings, strict=True))
     option, inset = stack.options, seen_inset_mm(stack)
-    # Of the common inset, the gap asks for what remains without draft.
+    # The gap causes the part of the common inset that remains without draft.
     by_gap = min(inset, option.gap_mm / 2)
     causes = (
         Cause("mold.tip_radius_mm", CORNER_SHARE * option.tip_radius_mm),

@@ -25,7 +25,7 @@ from cmpdesign.products.mold.solids.pins import pin_solid, pin_volume_mm3
 from cmpdesign.products.mold.solids.slab_shells import Feature, Slab, make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.stack.stack import MoldStack
 
-# Tangent of a vent's lean: a vent widens towards the outside, so that its plug tears off at the pad.
+# Tangent of a vent's wall angle: a vent widens towards the outside, so that its plug tears off at the pad.
 VENT_LEAN = float(np.tan(np.radians(5.0)))
 # Core diameter of the M3 holes for jack screws, which push a plate off.
 JACK_MM = 2.5
@@ -72,7 +72,7 @@ class Part:
     @property
     def pull_box_mm(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Low and high corner of the box, in the part's own frame, whose walls are pulled from silicone."""
-        # Silicone layers that shrink differently differ in size.
+        # Silicone layers of different shrinkage differ in size.
         edges = np.concatenate([self.stack.edges(layer)[1].points for layer in range(3)])
         (left, bottom), (right, top) = edges.min(axis=0), edges.max(axis=0)
         if self.turned:

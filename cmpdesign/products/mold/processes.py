@@ -1,4 +1,4 @@
-"""Work with the CAD kernel in processes of its own: such a process can be ended in the middle of a kernel's call.
+"""Work with the CAD kernel in separate processes, which can be ended in the middle of a kernel's call.
 
 A call into the kernel may take seconds and lets no other Python code run, so Ctrl-C in the kernel's own process would
 wait for its end. Parts do not depend on each other, so large molds are made by two processes at once.
@@ -27,7 +27,7 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.products.mold.parts import Part
 from cmpdesign.watch import tell, told
 
-# Starting a process and loading the kernel in it takes as long as some hundred bosses.
+# Starting a process and loading the kernel takes as long as some hundred bosses.
 MIN_BOSSES_FOR_TWO = 400
 
 
@@ -54,7 +54,7 @@ def results_of_parts(function: str, design: Design, layout: Layout, parts: Seque
         The results by the parts' names, in the order of ``parts``.
 
     Raises:
-        CmpDesignError: as the function raised it.
+        CmpDesignError: the error of the function.
         ModuleNotFoundError: the kernel is not installed.
     """
     if not sys.executable:  # an embedded interpreter
@@ -100,7 +100,7 @@ def _boss_count(part: Part) -> int:
 
 
 class _Message(NamedTuple):
-    """What a process sent: the process' number, and a result, an error or ``_END``."""
+    """A message of a process: the process' number, and a result, an error or ``_END``."""
 
     process: int
     content: Any
@@ -110,7 +110,9 @@ _END = object()
 
 
 def _run(tasks: Sequence[PartsTask]) -> list[list[Any]]:
-    """The results of every task, each from its own process; all processes have ended, whatever happens."""
+    """The results of every task, each from a separate process; in every case, all processes have ended at the
+    return.
+    """
     messages: SimpleQueue[_Message] = SimpleQueue()
     with ExitStack() as stack:
         errors = [stack.enter_context(TemporaryFile()) for _ in tasks]
@@ -126,7 +128,7 @@ def _run(tasks: Sequence[PartsTask]) -> list[list[Any]]:
 def _start(
     stack: ExitStack, errors: IO[bytes], messages: SimpleQueue[_Message], number: int
 ) -> subprocess.Popen[bytes]:
-    """Start a process that is killed when the stack is left, and a thread that forwards what the process sends."""
+    """Start a process that is killed at the end of the stack, and a thread that forwards the process' messages."""
     # multiprocessing is not used, because it would import the caller's script again.
     command = [sys.executable, "-P", "-c", f"from {__name__} import helper; helper()"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)}
@@ -163,8 +165,8 @@ def _collect(
     """The results of every task in its order.
 
     Raises:
-        CmpDesignError, ModuleNotFoundError: as a process sent it.
-        RuntimeError: a process ended early; with what it wrote to standard error.
+        CmpDesignError, ModuleNotFoundError: the error of a process.
+        RuntimeError: a process ended early; with its standard error.
     """
     results: list[list[Any]] = [[] for _ in tasks]
     total = sum(len(task.names) for task in tasks)
@@ -195,7 +197,7 @@ def _pickle_task(task: PartsTask) -> bytes:
 
 def helper() -> None:
     """One of the processes: reads a pickled task from standard input, writes pickled results to standard output."""
-    # Ctrl-C reaches all processes of a terminal; the process that waits ends this one.
+    # Ctrl-C reaches all processes of a terminal; the waiting process ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     output = os.fdopen(os.dup(1), "wb")
     # Messages of the kernel go to standard error.

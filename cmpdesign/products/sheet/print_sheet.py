@@ -29,7 +29,7 @@ from cmpdesign.products.sheet.page import (
 
 FOLDER = "print"
 INK, PAPER = "#000000", "#ffffff"
-# Free for the printer's grip; also free at the left and the bottom, for the key.
+# Margin for the printer's grip; further margin at the left and the bottom, for the key.
 MARGIN_MM, KEY_LEFT_MM, KEY_BOTTOM_MM = 10.0, 10.0, 32.0
 CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 0.5, 0.1
 # Sine of the least turn of a corner with crop marks: 30 to 150 degrees.
@@ -42,7 +42,7 @@ def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
     """Make ``print/sheet.svg`` and ``print/sheet.pdf``.
 
     Raises:
-        DesignError: no pad fits on the page, or fewer pads fit than the design asks for.
+        DesignError: no pad fits on the page, or fewer pads fit than the design states.
     """
     page, pads = make_print_page(design, layout)
     files: dict[str, str | bytes] = {f"{FOLDER}/sheet.svg": page_to_svg(page)}
@@ -64,10 +64,10 @@ def made_pad(design: Design, layout: Layout) -> MadePad:
 
 
 class PrintSide(NamedTuple):
-    """How a pad lies on its film.
+    """The print of a pad on a film.
 
     Attributes:
-        film: "opaque": the camera looks at the print; "clear": through the film at the print behind it.
+        film: "opaque": the camera sees the print directly; "clear": through the film.
         seen: the side of the pattern that the camera sees.
         mirror: the page shows the pattern mirrored.
         text: one line for the page.
@@ -80,9 +80,10 @@ class PrintSide(NamedTuple):
 
 
 def print_side(design: Design) -> PrintSide:
-    """On which side of which film a design is printed, and whether mirrored.
+    """The film, the printed side and the mirroring of a design.
 
-    A print looks as the camera sees it if the camera looks at the ink, and mirrored if it looks through the film.
+    The print is as seen by the camera if the camera sees the ink directly, and mirrored if the camera sees the ink
+    through the film.
     """
     seen = seen_side(design.mirrored)
     film = design.sheet.film or ("opaque" if seen == "front" else "clear")

@@ -56,7 +56,7 @@ class SheetReading:
         skew_deg: angle between the x and the y bar, less 90 degrees.
         rotation_deg: angle of the x bar in the picture, clockwise.
         perspective_mm: largest distance of a bar's end from the best affine map of the design. A camera that looks
-            at an angle makes this distance large; ratio and skew then contain the camera's share.
+            at an angle makes this distance large; ratio and skew then contain an error by the camera's angle.
     """
 
     key: SheetKey

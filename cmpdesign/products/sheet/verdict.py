@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Largest deviation of a scale from 1, and of the bars' angle from 90 degrees.
 SCALE_TOLERANCE, SKEW_TOLERANCE_DEG = 0.005, 0.2
-# A camera that leans by four degrees at a distance of 400 mm moves a bar's end by this.
+# A camera that leans by four degrees at a distance of 400 mm moves a bar's end by this distance.
 PERSPECTIVE_TOLERANCE_MM = 0.1
 # Printers scale by at most A3 to A5. Outside this range the stated resolution is not the picture's.
 PLAUSIBLE_SCALES = 0.45, 2.2
@@ -67,7 +67,7 @@ def judge_sheet(image: Image, path: Path | None, digest: str, dpi: float | None 
         image: (H, W, 3) BGR, uint8 or uint16.
         path: the picture's file, which may state the resolution; None without a file of its own.
         digest: digest of the layout.
-        dpi: resolution in place of the file's; 0: unknown, the file's resolution is ignored.
+        dpi: resolution instead of the file's; 0: unknown, the file's resolution is ignored.
     """
     bars = find_sheet_bars(image)
     if isinstance(bars, str):

@@ -30,7 +30,7 @@ def exact_bound(scene: Scene, *, size: tuple[int, int] = (640, 480)) -> NDArray[
     """The smallest covariance (M, 2, 2) px^2 of an unbiased estimate of the markers; NaN where not visible.
 
     A gridline moves with its two markers and keeps its curvature. Inks, light, blur and response are assumed to be
-    known. Clipped pixels tell nothing. JPEG and quantisation are neglected.
+    known. Clipped pixels have no information. JPEG and quantisation are neglected.
 
     Args:
         scene: a scene with noise and one view.

@@ -29,7 +29,7 @@ ON_WINDOW_MM = 1e-9  # rounding of a pattern that lies on the window
 
 @dataclass(frozen=True)
 class Medium:
-    """What lies between the pattern and the camera; a layer of 0 mm is absent.
+    """The layers between the pattern and the camera; a layer of 0 mm is absent.
 
     Attributes:
         gel_mm: thickness of the clear gel, from the pattern at rest to the window.

@@ -32,7 +32,7 @@ def _front_rotation() -> Points:
 
 
 class ViewDirection(NamedTuple):
-    """From where a camera looks at a point.
+    """The direction from which a camera sees a point.
 
     Attributes:
         tilt_deg: angle between the pattern's normal and the optical axis, -85 to 85.
@@ -136,7 +136,7 @@ class Pinhole:
         )
         if abs(h[2, 2]) < NEAREST_MM:
             raise SceneError(
-                "the layout's origin lies beside the camera, not before it; move the camera away"
+                "the layout's origin lies beside the camera, not before the camera; move the camera away"
             )
         return np.asarray(h / h[2, 2])
 
@@ -264,7 +264,7 @@ def project_3d(camera: Pinhole, xyz_mm: Points, medium: Medium | None = None) ->
     depth = xyz_camera[:, 2]
     if not np.all(depth > NEAREST_MM):
         if not np.isfinite(depth).all():
-            raise SceneError(f"{_camera_label(camera)}the surface is not finite everywhere; mend the map")
+            raise SceneError(f"{_camera_label(camera)}the surface is not finite everywhere; correct the map")
         worst = int(np.argmin(depth))
         position = ", ".join(f"{value:.3g}" for value in xyz_mm[worst])
         raise SceneError(

@@ -15,7 +15,7 @@ from cmpdesign.scene.errors import STRICT, SceneError
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole that looks at the layout's plane.
+    """A pinhole whose picture shows the layout's plane.
 
     Attributes:
         pitch_px: one pitch of the layout at the pattern's middle, without foreshortening by the tilt.
@@ -25,7 +25,7 @@ class Camera:
         centre_px: image position of the middle of the pattern's outline; None: the image's centre.
         focal_px: focal length, and distance in px; a small value means strong perspective. None: 1.5 times the
             image's longer side.
-        mirrored: the camera looks at the pattern's back; None: as the layout was designed.
+        mirrored: the camera sees the pattern's back; None: as designed.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -48,7 +48,7 @@ class Camera:
 
 
 def is_mirrored(camera: Camera, layout: Layout) -> bool:
-    """Whether this camera looks at the layout's back."""
+    """Whether this camera sees the layout's back."""
     return layout.mirrored if camera.mirrored is None else camera.mirrored
 
 

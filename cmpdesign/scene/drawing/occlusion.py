@@ -27,7 +27,7 @@ Planes = NDArray[np.float32]
 
 COARSE_PARTS, FINE_PARTS = 4, 16  # parts of a patch's side: for the search, and for the drawing
 SUSPECT_AREA_SHARE = (
-    0.35  # of the median facing area per layout area: patches below are searched with fine parts
+    0.35  # of the median facing area per layout area: patches below this share are searched with fine parts
 )
 MAX_BACKFACING_SHARE = 0.1  # largest share of the pattern that may turn away
 TILE_PX, SAMPLES_PER_PX = 32, 8

@@ -82,7 +82,7 @@ def _project_sides(
         pieces[open_sides] = more.astype(np.int64)
         if pieces.max(initial=0) > MAX_SIDE_PIECES:
             raise SceneError(
-                "the surface is not smooth: a gridline stays bent however finely it is cut; smooth the map"
+                "the surface is not smooth: a gridline is bent at every subdivision; smooth the map"
             )
     pieces *= 2
     starts = np.empty((int(pieces.sum()), 2))

@@ -34,7 +34,7 @@ class SceneView:
         xyz_from_layout: (N, 2) mm to (N, 3) mm, the surface in space.
         project: (N, 3) mm to (N, 2) px of the whole image.
         area: x, y, width, height of the view's part of the image.
-        mirrored: the camera looks at the pattern's back.
+        mirrored: the camera sees the pattern's back.
         homography: (3, 3) image from layout; None where straight lines become curves.
         camera: the pinhole; None where the surface stays in the layout's plane and depth is not defined.
         occlusion: the parts that turn away from the camera; None: there are none.
@@ -86,7 +86,7 @@ class SceneView:
         name = f"view {self.camera.name}: " if self.camera and self.camera.name else ""
         return (
             f"{name}{100 * self.occlusion.share:.2g} % of the pattern turn away from the camera, among others at "
-            f"({x:.3g}, {y:.3g}) mm; what they hide is marked as not visible"
+            f"({x:.3g}, {y:.3g}) mm; the hidden parts are marked as not visible"
         )
 
     def is_hidden(self, xy_mm: Points, step_mm: float) -> NDArray[np.bool_]:
@@ -121,7 +121,7 @@ def single_view(scene: Scene, size: tuple[int, int]) -> SceneView:
     """
     if isinstance(scene.camera, tuple) and len(scene.camera) > 1:
         raise SceneError(
-            f"the scene has {len(scene.camera)} views, one is needed; take the scene with camera = one of them"
+            f"the scene has {len(scene.camera)} views, one is needed; take the scene with camera = one view"
         )
     return scene_views(scene, size)[0]
 

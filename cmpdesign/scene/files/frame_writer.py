@@ -61,7 +61,9 @@ class PngFolderWriter:
 
     def __init__(self, path: Path) -> None:
         if path_exists(path) and not (is_folder(path) and not any(path.iterdir())):
-            raise OutputError(f"{path}: exists and is no empty folder; give another place or delete it")
+            raise OutputError(
+                f"{path}: exists and is no empty folder; give another place or delete the folder"
+            )
         self._path, self._frames = path, 0
         self._stage: Stage | None = None
 
@@ -97,7 +99,7 @@ class PngFolderWriter:
         self.discard()
 
     def discard(self) -> None:
-        """Delete all that was written and is not at its path."""
+        """Delete all files that were written and are not at their path."""
         if self._stage is not None:
             self._stage.close()
             self._stage = None

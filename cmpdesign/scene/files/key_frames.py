@@ -60,7 +60,9 @@ def _find_table(target: Any, name: str, path: str, parent_path: str) -> Any:
         )
     found = target[int(name)] if isinstance(target, list) else target[name]
     if not isinstance(found, dict | list):
-        raise SceneError(f"[sequence] values.{path}: {name} is a value, no table; leave out what follows it")
+        raise SceneError(
+            f"[sequence] values.{path}: {name} is a value, no table; leave out the names after it"
+        )
     return found
 
 

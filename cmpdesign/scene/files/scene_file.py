@@ -95,7 +95,7 @@ class SceneFile:
         return (solved.scene for solved in self.solved_scenes())
 
     def solved_scenes(self) -> Iterator[SolvedScene]:
-        """As ``scenes``, each with its contact.
+        """The scenes of ``scenes``, each with its contact.
 
         Raises:
             SceneError: see ``scenes``.
@@ -167,7 +167,7 @@ def scene_from_document(document: Mapping[str, Any], path: Path, layout: Layout)
 
     Args:
         document: the TOML document.
-        path: where it comes from, for messages; relative paths in the document start at its folder.
+        path: path of the document, for messages; relative paths in the document start at its folder.
         layout: the pattern.
 
     Raises:
@@ -189,7 +189,7 @@ def scene_from_document(document: Mapping[str, Any], path: Path, layout: Layout)
 
 
 def _check_tables(tables: SceneTables, file: SceneFile) -> None:
-    """Check all that needs no solution and no drawing."""
+    """Check all values without solving and without drawing."""
     _make_parts(tables, file)
     if tables.contact is not None:
         from cmpdesign.scene.files.contacts import check_contact

@@ -153,11 +153,11 @@ class SequenceTable(Table):
             times = [key[0] for key in keys]
             if not times or any(b <= a for a, b in pairwise(times)):
                 raise ValueError(
-                    f"values.{path}: the times are {times}; give at least one, each later than before"
+                    f"values.{path}: the times are {times}; give at least one time, in increasing order"
                 )
             if len({len(v) if isinstance(v, tuple) else -1 for _, v in keys}) != 1:
                 raise ValueError(
-                    f"values.{path}: its values have different shapes; give each as many numbers"
+                    f"values.{path}: the values have different shapes; give the same number of numbers for each time"
                 )
         return self
 
@@ -190,9 +190,9 @@ class SceneTables(Table):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.camera is not None and self.view is not None:
-            raise ValueError("[camera] and [[view]] both say where the pattern is seen from; leave one out")
+            raise ValueError("[camera] and [[view]] both place the camera; leave one out")
         if self.view is not None and not self.view:
-            raise ValueError("view is empty; give at least one [[view]] table or none")
+            raise ValueError("view is empty; give at least one [[view]] table, or leave view out")
         if not all(10 <= side <= 9999 for side in self.size_px):
             raise ValueError(f"size_px is {list(self.size_px)}; each side must lie between 10 and 9999 px")
         return self

@@ -20,9 +20,9 @@ class Sensor:
 
     Attributes:
         noise: sigma of the white Gaussian noise of the encoded picture, in units of an 8-bit step (noise 2 is 2/255).
-        response: how light becomes values: "srgb", "linear", an exponent (light is value ** exponent), or a table of
-            the light of all 256 values. Colors of inks, backgrounds and dirt are the values that they have in a picture
-            without blur and noise.
+        response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
+            of the light of all 256 values. Colors of inks, backgrounds and dirt are the values that they have in a
+            picture without blur and noise.
         bits: 8 or 16.
         jpeg_quality: 1 to 100; None: no compression. 8 bits only.
     """

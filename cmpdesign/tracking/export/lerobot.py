@@ -1,4 +1,4 @@
-"""Runs as a LeRobotDataset v3.0: one run is one episode; features ``observation.tactile.*``, and on wish images."""
+"""Runs as a LeRobotDataset v3.0: one run is one episode; features ``observation.tactile.*``, and optionally images."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from cmpdesign.watch import told
 
 PREFIX = "observation.tactile."
 VIDEO_KEY = "observation.images.tactile"
-# Full resolution of color, because markers are read from it; every second frame can be looked up by itself.
+# Full resolution of color, because markers are read from color; every second frame can be decoded alone.
 VIDEO_CODEC = Codec("libx264", "yuv444p", {"crf": "12", "g": "2", "bf": "0"})
 VIDEO_CODEC_NAME = "h264"
 BYTES_A_MB = 1 << 20
@@ -45,13 +45,13 @@ BYTES_A_MB = 1 << 20
 
 @dataclass(frozen=True)
 class DataSet:
-    """What a data set holds besides its runs.
+    """The parameters of a data set.
 
     Attributes:
         fps: frames per second.
-        task: what the runs show, in words.
+        task: task that the runs show, in words.
         robot: type of the robot; None: none.
-        images: the runs' sources, one for each, or none.
+        images: the runs' sources, one for each run, or none.
         most_pixels: limit of width x height of an image.
     """
 
@@ -63,12 +63,12 @@ class DataSet:
 
 
 def write_lerobot(runs: Sequence[Path], path: Path, about: DataSet) -> int:
-    """Write a data set; it is complete on disk before it has its name.
+    """Write a data set; the data set is complete on disk before it gets its name.
 
     Args:
-        runs: .npz files of ``track`` or of ``reconstruct``, one an episode.
+        runs: .npz files of ``track`` or of ``reconstruct``, one file for each episode.
         path: the data set's folder; it does not exist.
-        about: what it holds besides.
+        about: the parameters.
 
     Returns:
         The number of frames.
@@ -83,7 +83,7 @@ def write_lerobot(runs: Sequence[Path], path: Path, about: DataSet) -> int:
     require_sources(len(runs), len(about.images))
     require_one_kind(runs)
     if path.exists():
-        raise OutputError(f"{path}: exists; delete it, or give another name")
+        raise OutputError(f"{path} exists; delete it, or give another name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with Stage(path.parent) as stage:
@@ -145,7 +145,7 @@ def _columns_of(run: Run, episode: int, first: int, fps: float) -> dict[str, np.
 
 
 class _Place:
-    """Chunk and file of the next episode: a file that has reached its size is followed by another one."""
+    """Chunk and file of the next episode: after a file that has reached its size, a new file."""
 
     def __init__(self) -> None:
         self.number = 0
@@ -164,7 +164,7 @@ class _DataFiles:
         self._path = folder
 
     def add(self, table: Any) -> dict[str, int]:
-        """Append an episode; where it is."""
+        """Append an episode; the place of the episode."""
         if self._writer is not None and self._path.stat().st_size >= DATA_FILE_MB * BYTES_A_MB:
             self.close()
             self._place.number += 1
@@ -198,7 +198,7 @@ class _VideoFiles:
         self.statistics: Statistics
 
     def add(self, run: Run, source: str, most_pixels: int) -> dict[str, Any]:
-        """Append an episode's images; where they are."""
+        """Append an episode's images; the place of the images."""
         if self._video is not None and self._path.stat().st_size >= VIDEO_FILE_MB * BYTES_A_MB:
             self.close()
             self._place.number += 1

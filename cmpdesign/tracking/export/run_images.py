@@ -1,4 +1,4 @@
-"""The images of a run's frames, from the source that the run was made of."""
+"""The images of a run's frames, from the source of the run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Picture = NDArray[np.uint8]
 
 
 def run_images(run: Run, source: str, most_pixels: int = MOST_PIXELS) -> Iterator[Picture]:
-    """The image of every frame of a run, (H, W, 3) uint8 BGR; black where the source has none.
+    """The image of every frame of a run, (H, W, 3) uint8 BGR; black where the source has no image.
 
     Args:
         run: the run.
@@ -29,7 +29,10 @@ def run_images(run: Run, source: str, most_pixels: int = MOST_PIXELS) -> Iterato
     """
     opened = open_source(source, None, most_pixels)
     if opened.is_live:
-        raise CmpDesignError(f"--images {source}: its frames are gone; give a video or a folder of images")
+        raise CmpDesignError(
+            f"--images {source}: frames of a camera or stream cannot be read again; give a video or "
+            "a folder of images"
+        )
     wanted = set(run.frame.tolist())
     shape: tuple[int, ...] | None = None
     waiting = found = 0
@@ -65,5 +68,5 @@ def require_sources(runs: int, sources: int) -> None:
     """
     if sources not in (0, runs):
         raise CmpDesignError(
-            f"--images is given {sources} times for {runs} runs; give one for each, in order"
+            f"--images is given {sources} times for {runs} runs; give one for each run, in order"
         )

@@ -16,14 +16,14 @@ from cmpdesign.tracking.columns import Columns
 from cmpdesign.tracking.recording.points import positions_mm
 
 _SHARED = ("frame", "time_s", "frame_status", "status", "layer")
-# Format of a file -> the columns that are read of it.
+# Format of a file -> the columns that are read.
 _COLUMNS = {
     "cmp-tracking": (*_SHARED, "xy_px", "displacement_mm", "layout_from_image", "mm_per_px"),
     "cmp-reconstruction": (*_SHARED, "3D_Positions", "3D_Displacements"),
 }
 _SURFACE = "surface_displacement_mm"
 MAX_FPS = 1e5
-WHOLE_FPS = 0.005  # a rate this near to a whole number is that number
+WHOLE_FPS = 0.005  # a rate within this distance of a whole number is rounded
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Run:
 
 @dataclass(frozen=True)
 class RunKind:
-    """What the runs of one data set have in common.
+    """The common properties of the runs of one data set.
 
     Attributes:
         format: of the files, for example "cmp-reconstruction".
@@ -68,7 +68,7 @@ def read_run(path: Path) -> Run:
     """Read a run.
 
     Raises:
-        CmpDesignError: the file cannot be read, or is none of ``track`` or ``reconstruct``, or holds no frame.
+        CmpDesignError: the file cannot be read, is no file of ``track`` or ``reconstruct``, or holds no frame.
     """
     kind = _kind_of(path)
     columns = _read_columns(path, *_COLUMNS[kind.format])
@@ -92,13 +92,13 @@ def require_one_kind(paths: Sequence[Path]) -> RunKind:
             one, other = getattr(kinds[0], what), getattr(kind, what)
             if one != other:
                 raise CmpDesignError(
-                    f"{path}: its {what} is {other}, that of {paths[0]} is {one}; export them as two data sets"
+                    f"{path}: the {what} is {other}, that of {paths[0]} is {one}; export them as two data sets"
                 )
     return kinds[0]
 
 
 def frames_per_second(runs: Sequence[Path]) -> float:
-    """The frame rate of runs: 1 over the median time from a frame to the next.
+    """The frame rate of runs: 1 over the median time between frames.
 
     Raises:
         CmpDesignError: no two frames of a run have times.
@@ -115,13 +115,13 @@ def frames_per_second(runs: Sequence[Path]) -> float:
 
 
 def tidy_fps(fps: float) -> float:
-    """A whole number where the rate is one within its rounding, else three decimals."""
+    """A whole number where the rate is whole within rounding, else three decimals."""
     whole = round(fps)
     return whole if whole and abs(fps - whole) < WHOLE_FPS * whole else round(fps, 3)
 
 
 def largest_shift_s(run: Run, fps: float) -> float:
-    """By how much a frame's time differs at most from that of an even rate, s."""
+    """The largest difference of a frame's time from that of an even rate, s."""
     even_s = np.arange(len(run)) / fps
     late_s = run.arrays["time_s"] - run.arrays["time_s"][0] - even_s
     return float(np.nanmax(np.abs(late_s), initial=0.0))
@@ -129,13 +129,13 @@ def largest_shift_s(run: Run, fps: float) -> float:
 
 def _kind_of(path: Path) -> RunKind:
     if path.suffix != ".npz":
-        raise CmpDesignError(f"{path}: unknown ending; expected .npz, as track and reconstruct write it")
+        raise CmpDesignError(f"{path}: unknown ending; expected .npz, as written by track and reconstruct")
     try:
         columns = read_npz(path, "format", "digest")
     except NpzError:
         columns = {}
     if str(columns.get("format")) not in _COLUMNS:
-        raise CmpDesignError(f"{path}: is no run; expected an .npz file of track or reconstruct")
+        raise CmpDesignError(f"{path} is no run; expected an .npz file of track or reconstruct")
     try:
         read_npz(path, _SURFACE)
         surface = "with"
@@ -152,7 +152,7 @@ def _read_columns(path: Path, *names: str) -> Columns:
 
 
 def _arrays_of(columns: Columns, kind: RunKind) -> dict[str, NDArray[Any]]:
-    """The arrays of the markers, without the virtual ones."""
+    """The arrays of the markers, without the virtual markers."""
     markers = len(columns["layer"])
     if kind.format == "cmp-reconstruction":
         moved, places = columns["3D_Displacements"][:, :markers], columns["3D_Positions"][:, :markers]

@@ -1,4 +1,4 @@
-"""Statistics of features as LeRobot has them: of an episode, and of all."""
+"""Statistics of features in LeRobot's form: of an episode, and of all episodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEVELS = 256  # of a channel of an image
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """Statistics over frames; 0 where nothing is known, because JSON has no NaN.
+    """Statistics over frames; 0 without known values, because JSON has no NaN.
 
     Attributes:
         frames: number of frames.
@@ -34,7 +34,7 @@ class Statistics:
 
 
 def statistics_of(values: NDArray[Any]) -> Statistics:
-    """Statistics of (F, ...): of (F,) one figure, of (F, M) one an element, of (F, M, k) one a coordinate.
+    """Statistics of (F, ...): of (F,) one figure, of (F, M) one per element, of (F, M, k) one per coordinate.
 
     NaN counts as unknown.
     """
@@ -96,7 +96,7 @@ class ImageStatistics:
 def pooled(parts: Sequence[Statistics]) -> Statistics:
     """The statistics of several episodes together.
 
-    All are exact but for the quantiles, which are the episodes' means weighted by their numbers of known values.
+    All are exact except for the quantiles, which are the episodes' means weighted by their numbers of known values.
     """
     known = np.sum([part.known for part in parts], axis=0)
     weights = [part.known / np.maximum(known, 1) for part in parts]

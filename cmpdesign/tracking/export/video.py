@@ -1,4 +1,4 @@
-"""Video files written by PyAV, and what is to be known of their codecs."""
+"""Video files written by PyAV, and the parameters of their codecs."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class CodecVideo:
     """Writes a video, frame by frame; ``close`` completes the file.
 
     Args:
-        path: the file; its ending tells the container.
-        codec: how frames are compressed.
+        path: the file; the ending determines the container.
+        codec: compression of the frames.
         fps: frames per second.
     """
 
@@ -94,5 +94,5 @@ class CodecVideo:
 
 
 def pixels_of(picture: NDArray[Any]) -> NDArray[np.uint8]:
-    """A picture with 8 bits a channel, as videos have; of 16 bits the upper ones."""
+    """A picture with 8 bits a channel, for videos; of 16 bits the upper 8 bits."""
     return (picture >> 8).astype(np.uint8) if picture.dtype == np.uint16 else picture

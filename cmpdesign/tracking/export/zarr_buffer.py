@@ -1,7 +1,7 @@
 """Runs as a replay buffer in the form of Diffusion Policy: a Zarr group (format 2) of data/<key> and meta/episode_ends.
 
-``data/tactile_<name>`` has the frames of all runs one after another; ``meta/episode_ends`` (episodes,) int64 says
-where each run ends.
+``data/tactile_<name>`` has the frames of all runs one after another; ``meta/episode_ends`` (episodes,) int64 holds the
+end of each run.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ def require_zarr() -> Any:
 def write_zarr(
     runs: Sequence[Path], path: Path, images: Sequence[str] = (), most_pixels: int = MOST_PIXELS
 ) -> int:
-    """Write a replay buffer; it is complete on disk before it has its name.
+    """Write a replay buffer; the buffer is complete on disk before it gets its name.
 
     Args:
-        runs: .npz files of ``track`` or of ``reconstruct``, one an episode.
+        runs: .npz files of ``track`` or of ``reconstruct``, one file for each episode.
         path: the group's folder; it does not exist.
         images: the runs' sources, for data/tactile_image (N, H, W, 3) uint8 RGB; none: no images.
         most_pixels: limit of width x height of an image.
@@ -59,7 +59,7 @@ def write_zarr(
     require_sources(len(runs), len(images))
     kind = require_one_kind(runs)
     if path.exists():
-        raise OutputError(f"{path}: exists; delete it, or give another name")
+        raise OutputError(f"{path} exists; delete it, or give another name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with Stage(path.parent) as stage:

@@ -1,5 +1,5 @@
-"""Live viewers: frames sent to Foxglove or Rerun while a run goes on.
+"""Live viewers: frames sent to Foxglove or Rerun during a run.
 
 In: tracked frames with their images, and the table that makes their columns. Out: a server on this machine that viewers
-connect to, the number of frames that it sent, and of those that it left out.
+connect to, and the numbers of sent and left-out frames.
 """

@@ -14,13 +14,13 @@ from cmpdesign.tracking.live.options import HOST
 from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
 from cmpdesign.tracking.recording.topics import TopicMessages
 
-# Messages that wait for one viewer; then the oldest is left out. With images, 4 a frame, some 32 MB.
+# Messages that wait for one viewer; then the oldest message is left out. With images, 4 messages a frame, some 32 MB.
 BACKLOG_MESSAGES = 256
-CLOSE_S = 0.5  # time for viewers to take what waits for them
+CLOSE_S = 0.5  # time for viewers to receive the waiting messages
 SUBSCRIBE_S = 0.05  # from a viewer's first subscription to its others
 POLL_S = 0.01
 _LOGGER = "foxglove"
-_FULL = "full"  # in the log line of the library of an outbox that is full
+_FULL = "full"  # in the library's log line on a full outbox
 
 
 def require_foxglove() -> Any:
@@ -40,8 +40,8 @@ class FoxgloveServer:
     Args:
         frame_id: the coordinate frame of the markers, and the first part of all topics but the diagnostics'.
         port: a free port on this machine.
-        places: of the images that are shown. All topics exist before a client can connect: to a client that is there
-            already, the library may offer a topic before it takes subscriptions to it.
+        places: places of the shown images. All topics exist before a client can connect: to a connected client,
+            the library may offer a topic before it accepts subscriptions to the topic.
 
     Raises:
         CmpDesignError: a library is not installed, or the port cannot be opened.
@@ -105,7 +105,7 @@ class FoxgloveServer:
 
 
 class _Watch(logging.Handler):
-    """Hears of viewers whose outbox is full: the library says so in its log alone, and not how often."""
+    """Detects viewers whose outbox is full: the library reports this in its log only, without a count."""
 
     is_behind = False
 
@@ -115,7 +115,7 @@ class _Watch(logging.Handler):
 
 
 def _watch_log(foxglove: Any) -> _Watch:
-    """Hear the library's log, and keep it off the terminal."""
+    """Read the library's log, and keep the log off the terminal."""
     watch, logger = _Watch(), logging.getLogger(_LOGGER)
     logger.addHandler(watch)
     logger.propagate = False
@@ -127,7 +127,7 @@ def _watch_log(foxglove: Any) -> _Watch:
 
 @contextmanager
 def _unchanged_root() -> Iterator[None]:
-    """The program's own log stays as it is: ``set_log_level`` gives it a handler."""
+    """The program's own log is not changed: ``set_log_level`` gives it a handler."""
     root = logging.getLogger()
     handlers, level = root.handlers[:], root.level
     try:

@@ -1,4 +1,4 @@
-"""What a live server is, and where it listens."""
+"""The kind and the port of a live server."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal, Protocol, get_args
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.tracking.recording.frames import RecordedFrame
 
-HOST = "127.0.0.1"  # of this machine alone; there is no other choice, because nobody is asked for a password
+HOST = "127.0.0.1"  # this machine only; there is no other choice, because there is no password
 LiveKind = Literal["foxglove", "rerun"]
 # The viewers' own ports.
 PORTS: Mapping[LiveKind, int] = {"foxglove": 8765, "rerun": 9876}
@@ -22,8 +22,8 @@ class Live:
 
     Attributes:
         kind: the viewer.
-        port: the port on this machine; None: the viewer's own; 0: any that is free.
-        wait_s: how long the first frame waits for a viewer of Foxglove, s.
+        port: the port on this machine; None: the viewer's own port; 0: any free port.
+        wait_s: waiting time of the first frame for a viewer of Foxglove, s.
 
     Raises:
         CmpDesignError: no such viewer, no such port, or no such time.
@@ -44,14 +44,14 @@ class Live:
             raise CmpDesignError(f"--live-wait {self.wait_s:g}: expected a number of seconds from 0")
         if self.wait_s and self.kind == "rerun":
             raise CmpDesignError(
-                "--live-wait: Rerun's server keeps the frames for a viewer that comes later; leave it out"
+                "--live-wait: Rerun's server keeps the frames for a viewer that connects later; leave it out"
             )
 
     def free_port(self) -> int:
-        """The port, which no other program has.
+        """The port, if no other program uses it.
 
         Raises:
-            CmpDesignError: another program has it.
+            CmpDesignError: another program uses the port.
         """
         port = PORTS[self.kind] if self.port is None else self.port
         try:
@@ -63,7 +63,7 @@ class Live:
         except OSError as error:
             raise CmpDesignError(
                 f"--live-port {port}: cannot be opened ({error.strerror or error}); "
-                "end the program that has it, or give another port"
+                "end the program that uses it, or give another port"
             ) from None
 
 
@@ -71,23 +71,23 @@ class Server(Protocol):
     """A server of frames; only one thread calls it.
 
     Attributes:
-        address: what a viewer opens.
+        address: address for the viewer.
     """
 
     address: str
 
     def wait(self, seconds: float) -> bool:
-        """Wait for a viewer; True if there is one."""
+        """Wait for a viewer; True if a viewer is connected."""
         ...
 
     def send(self, frames: Sequence[RecordedFrame]) -> None:
-        """Send frames to all viewers; what a viewer does not take in time is left out."""
+        """Send frames to all viewers; frames that a viewer does not receive in time are left out."""
         ...
 
     def is_behind(self) -> bool:
-        """True where a viewer did not take all messages so far."""
+        """True if a viewer did not receive all messages so far."""
         ...
 
     def close(self) -> None:
-        """Give viewers a moment to take the last frames, and stop."""
+        """Wait until viewers have received the last frames, or for a short time, and stop."""
         ...

@@ -14,19 +14,19 @@ from cmpdesign.tracking.sinks.tables import FrameSink, open_sink
 
 
 class Outputs(NamedTuple):
-    """Where a run's frames go; ``live`` is None where nobody looks."""
+    """The outputs of a run's frames; ``live`` is None without a live view."""
 
     sink: FrameSink
     live: LiveView | None
 
 
 def open_outputs(path: Path, table: FrameTable, recording: Recording, live: Live | None) -> Outputs:
-    """Open the live server, if one is wanted, and then the file: without the server, no file is made.
+    """Open the live server, if wanted, and then the file: if the server fails, no file is made.
 
     Args:
         path: see ``open_sink``.
         table: the frames' columns.
-        recording: its images are also shown live; a table beside a live server may do without them.
+        recording: options; the images are also shown live, also where the file is a table without images.
         live: the live server's options.
 
     Raises:

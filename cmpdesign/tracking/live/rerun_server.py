@@ -10,13 +10,13 @@ from cmpdesign.tracking.live.options import HOST
 from cmpdesign.tracking.recording.frames import RecordedFrame
 from cmpdesign.tracking.recording.rerun_rows import APPLICATION, RerunRows, require_rerun
 
-MEMORY = "128MiB"  # of frames for viewers that come later; then the oldest are left out
+MEMORY = "128MiB"  # of frames for viewers that connect later; then the oldest frames are left out
 CLOSE_S = 0.5  # time for viewers to take the last frames
 FLUSH_S = 5.0
 
 
 class RerunServer:
-    """Serves frames, and keeps the last ones for viewers that come later.
+    """Serves frames, and keeps the last frames for viewers that connect later.
 
     Args:
         frame_id: the coordinate frame of the markers, and the first part of all entities but the diagnostics'.
@@ -38,7 +38,7 @@ class RerunServer:
         self.address = f"rerun+http://{HOST}:{port}/proxy"
 
     def wait(self, seconds: float) -> bool:
-        """Nobody has to wait: a viewer that comes later gets the frames before."""
+        """No wait: a viewer that connects later gets the earlier frames."""
         return True
 
     def send(self, frames: Sequence[RecordedFrame]) -> None:
@@ -46,7 +46,7 @@ class RerunServer:
             self._stream.send_columns(one.entity, one.timelines, one.columns, strict=True)
 
     def is_behind(self) -> bool:
-        """Not known: a viewer takes what the server's memory still holds."""
+        """Not known: a viewer gets the frames that the server's memory still holds."""
         return False
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Frames handed to a live server by a thread of its own, so that the tracker waits for nobody."""
+"""Frames sent to a live server by a separate thread, so that the tracker does not wait."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from cmpdesign.tracking.recording.frames import FrameReader, image_places
 from cmpdesign.tracking.recording.images import png_of
 from cmpdesign.tracking.recording.options import RecordedTable, Recording
 
-QUEUE_FRAMES = 32  # that wait for the thread; then the oldest is left out
-AT_ONCE = 4  # frames that the thread takes together
+QUEUE_FRAMES = 32  # frames that wait for the thread; then the oldest frame is left out
+AT_ONCE = 4  # frames that the thread processes together
 END_S = 10.0  # for the frames that wait at the end
 
 
 class LiveCount(NamedTuple):
-    """What a live server did.
+    """The counts of a live server.
 
     Attributes:
-        sent: number of frames that it sent.
-        left_out: number of frames that it left out, because making their messages took longer than tracking.
-        is_viewer_behind: a viewer took fewer messages than were sent to it.
-        failure: why it stopped before the end; "" if it did not.
+        sent: number of sent frames.
+        left_out: number of left-out frames, because making their messages took longer than tracking.
+        is_viewer_behind: a viewer received fewer messages than were sent.
+        failure: why the server stopped before the end; "" without a failure.
     """
 
     sent: int
@@ -40,16 +40,16 @@ class _Waiting(NamedTuple):
 
 
 class LiveView:
-    """Shows frames while a run goes on. No failure of the server ends the run.
+    """Shows frames during a run. No failure of the server ends the run.
 
     Args:
         server: the server.
         table: makes the frames' columns.
         with_images: show the images, too.
-        wait_s: how long the first frame waits for a viewer, s.
+        wait_s: waiting time of the first frame for a viewer, s.
 
     Attributes:
-        address: what a viewer opens.
+        address: address for the viewer.
         wait_s: as given.
     """
 
@@ -68,11 +68,13 @@ class LiveView:
         self._thread.start()
 
     def wait(self, seconds: float) -> bool:
-        """Wait for a viewer, before the first frame is handed over; True if there is one."""
+        """Wait for a viewer before the first frame; True if a viewer is connected."""
         return self._server.wait(seconds)
 
     def add(self, frame: Any, image: Any = None) -> None:
-        """Hand over a tracked frame and its image, which nobody changes from now on; returns at once."""
+        """Give a tracked frame and its image to the thread; both must not be changed afterwards. The call returns at
+        once.
+        """
         with self._changed:
             self._queue.append(_Waiting(frame, image if self._with_images else None))
             if len(self._queue) > QUEUE_FRAMES:
@@ -85,7 +87,7 @@ class LiveView:
         return len(self._queue)
 
     def close(self) -> LiveCount:
-        """Send what waits, and stop the server; calls after the first one change nothing."""
+        """Send the waiting frames, and stop the server; further calls have no effect."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
@@ -93,11 +95,11 @@ class LiveView:
         return self.count()
 
     def count(self) -> LiveCount:
-        """What was sent so far."""
+        """The counts so far."""
         return LiveCount(self._sent, self._left_out, self._server.is_behind(), self._failure)
 
     def _work(self) -> None:
-        """Runs in the thread. What the viewer's library raises is not known in advance, and must not end the run."""
+        """Runs in the thread. Exceptions of the viewer's library are not known in advance, and must not end the run."""
         try:
             while some := self._next():
                 self._send(some)
@@ -109,7 +111,7 @@ class LiveView:
             self._failure = self._failure or f"{type(error).__name__}: {error}"
 
     def _next(self) -> list[_Waiting]:
-        """The frames that wait; without any, the next one; empty at the end."""
+        """The waiting frames; without waiting frames, the next frame; empty at the end."""
         with self._changed:
             while not self._queue and not self._is_closed:
                 self._changed.wait()
@@ -127,12 +129,12 @@ class LiveView:
 
 
 def open_view(live: Live, table: FrameTable, recording: Recording) -> LiveView:
-    """Start a server and the thread that feeds it.
+    """Start a server and its thread.
 
     Args:
         live: the server's options.
         table: the frames' columns.
-        recording: what is shown; its images as they would be recorded.
+        recording: the shown content; images as they would be recorded.
 
     Raises:
         CmpDesignError: a library is not installed, or the port cannot be opened.

@@ -13,11 +13,13 @@ from cmpdesign.tracking.recording.frames import FrameReader
 from cmpdesign.tracking.recording.images import kept_image
 from cmpdesign.tracking.recording.topics import TopicMessages, require_rosbags
 
-METADATA_VERSION = 8  # of rosbag2; Iron and later read it, and files of one .mcap need none
+METADATA_VERSION = (
+    8  # version of rosbag2's metadata; Iron and later read it, and a single .mcap file needs no metadata
+)
 
 
 def write_recording(chunks: Iterable[Columns], about: Columns, path: Path, images: Path) -> None:
-    """Write a recording; it is complete on disk before it has its name.
+    """Write a recording; the recording is complete on disk before it gets its name.
 
     Args:
         chunks: the columns of frames, chunk by chunk, of a ``RecordedTable``.
@@ -26,7 +28,7 @@ def write_recording(chunks: Iterable[Columns], about: Columns, path: Path, image
         images: folder of the kept images.
 
     Raises:
-        OSError: it cannot be written, or a folder of this name exists; what is at the place is unchanged.
+        OSError: the recording cannot be written, or a folder of this name exists; existing files are unchanged.
     """
     if path.is_dir():
         raise IsADirectoryError(21, "is a folder; delete it, or give another name")

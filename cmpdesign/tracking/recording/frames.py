@@ -1,4 +1,4 @@
-"""A frame as recordings and live viewers show it: its time, its markers as records, how it was read, its images."""
+"""A frame for recordings and live viewers: time, markers as records, diagnostics, images."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cmpdesign.tracking.recording.options import QUALITY
 from cmpdesign.tracking.recording.points import Records, marker_records
 
 NS_PER_S = 10**9
-STEP_NS = NS_PER_S // 30  # from the frame before to a frame whose time the source does not know
+STEP_NS = NS_PER_S // 30  # time from the previous frame to a frame without a time of the source
 _STATUS_NAMES = ("lost", "measured", "repaired", "fitted")
 
 # (frame number, view) -> PNG, or None; the view is None for the image with all views.
@@ -46,7 +46,7 @@ class FrameImage:
         base: the first part of its topics, without "/" before it.
         png: the file's bytes.
         size_px: (width, height).
-        views: what is known of the cameras of the views that the image shows.
+        views: cameras of the views that the image shows.
     """
 
     base: str
@@ -70,7 +70,7 @@ class RecordedFrame:
         markers: (M,) records, see ``marker_records``.
         level: OK, WARN or ERROR.
         text: the frame's status, its reason and the hints.
-        values: what its diagnostics list; numbers as text, "nan" where unknown.
+        values: values of the diagnostics; numbers as text, "nan" where unknown.
         images: the images that are recorded or shown.
     """
 
@@ -84,7 +84,7 @@ class RecordedFrame:
 
 
 class FrameReader:
-    """Makes frames from columns; the frames' times go on from chunk to chunk."""
+    """Makes frames from columns; the frames' times continue from chunk to chunk."""
 
     def __init__(self) -> None:
         self._last_ns = -STEP_NS
@@ -113,14 +113,14 @@ class FrameReader:
             )
 
     def _time_ns(self, time_s: float) -> int:
-        """A frame's time; of a frame without one, some time after the frame before."""
+        """A frame's time; for a frame without a time, a fixed time after the previous frame."""
         known = np.isfinite(time_s)
         self._last_ns = max(0, round(time_s * NS_PER_S)) if known else self._last_ns + STEP_NS
         return self._last_ns
 
 
 def image_places(about: Columns, is_one_a_view: bool) -> list[ImagePlace]:
-    """Where the images of all frames stand.
+    """The places of the images of all frames.
 
     Args:
         about: the shared columns of a ``RecordedTable``.
@@ -144,7 +144,7 @@ def _frame_images(number: int, about: Columns, images_of: ImagesOf) -> Iterator[
 
 
 def _views_in(view: int | None, base: str, about: Columns) -> Iterator[CameraView]:
-    """The views that an image shows: a view of its own, or all."""
+    """The views that an image shows: one view, or all views."""
     names = [str(name) for name in about["view_names"]]
     if not names:
         yield CameraView(base, Lens())
@@ -168,7 +168,9 @@ def _topic_name(view: str) -> str:
 
 
 def _judge(row: dict[str, Any]) -> tuple[int, str]:
-    """Level and text of a frame: an error where it is not tracked, a warning where something limits it."""
+    """Level and text of a frame: an error where the frame is not tracked, a warning where a reason or a hint limits
+    it.
+    """
     status, reason, hints = FRAME_STATUS[row["frame_status"]], str(row["reason"]), str(row["hints"])
     notes = "; ".join(note for note in (reason, hints) if note)
     level = ERROR if status != "tracked" else WARN if notes else OK
@@ -176,7 +178,7 @@ def _judge(row: dict[str, Any]) -> tuple[int, str]:
 
 
 def _diagnostic_values(row: dict[str, Any], statuses: Any, views: list[str]) -> dict[str, str]:
-    """What a DiagnosticStatus lists of a frame; numbers as text, "nan" where unknown."""
+    """The values of a frame in a DiagnosticStatus; numbers as text, "nan" where unknown."""
     counts = np.bincount(statuses, minlength=len(_STATUS_NAMES)).tolist()
     values = {
         "frame": str(row["frame"]),

@@ -31,7 +31,7 @@ def keep_images(folder: Path, frame: int, images: Any) -> None:
 
 
 def png_of(images: Any, view: int | None) -> bytes | None:
-    """One of a frame's images as PNG, compressed for speed; None where there is none.
+    """One of a frame's images as PNG, with fast compression; None without an image.
 
     Args:
         images: see ``keep_images``.
@@ -49,12 +49,12 @@ def png_of(images: Any, view: int | None) -> bytes | None:
 
 
 def kept_image(folder: Path, frame: int, view: int | None) -> bytes | None:
-    """A frame's image as PNG; None where the frame has none, or where a killed run left only a part of it.
+    """A frame's image as PNG; None where the frame has no image, or where the file of a killed run is incomplete.
 
     Args:
         folder: where the run's chunks are.
         frame: the frame's number.
-        view: the view that has an image of its own; None for the image with all views.
+        view: the view with a separate image; None for the image with all views.
     """
     try:
         data = read_file(_image_path(folder, frame, view))

@@ -1,4 +1,4 @@
-"""The messages of one frame: points, diagnostics, images and what is known of the cameras."""
+"""The messages of one frame: points, diagnostics, images and cameras."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Messages:
 
     Args:
         types: the classes of the message types by their names, as of a ``Typestore``, or ROS's own.
-        octets: makes the value of a field of bytes; by default an array, as rosbags takes it.
+        octets: makes the value of a field of bytes; by default an array, for rosbags.
     """
 
     def __init__(self, types: Mapping[str, Any], octets: Callable[[bytes], Any] = _as_array) -> None:

@@ -1,4 +1,4 @@
-"""What a recording holds besides a table, and the table with the columns that messages need."""
+"""The options of a recording, and the table with the columns that messages need."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def is_recording(path: Path) -> bool:
 
 
 class RecordedTable:
-    """A table whose frames and shared columns also hold what messages need.
+    """A table whose frames and shared columns also hold the values for messages.
 
     Args:
         table: the table.
@@ -96,7 +96,7 @@ class RecordedTable:
 
 
 def _qualities_of(frame: Any) -> list[Quality | None]:
-    """The quality of each view's image of a ``Tracked`` or a ``ShapeFrame``; None where there is no image."""
+    """The quality of each view's image of a ``Tracked`` or a ``ShapeFrame``; None without an image."""
     return [view.markers.quality for view in getattr(frame, "views", (frame,))]
 
 

@@ -1,4 +1,4 @@
-"""Frames as rows of Rerun: what a recording's messages hold, as columns of Rerun's entities."""
+"""Frames as rows of Rerun: the content of a recording's messages, as columns of Rerun's entities."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def require_rerun() -> Any:
     """
     os.environ.setdefault(
         "RUST_LOG", "off"
-    )  # failures are raised here; its own lines would stand between ours
+    )  # failures are raised here; the library's own lines would appear in the output
     with extra("rerun", "write .mcap"):
         import rerun
     return rerun
@@ -71,7 +71,7 @@ class RerunRows:
         yield from self._images(frames)
 
     def _rows(self, entity: str, frames: Sequence[RecordedFrame], columns: Iterable[Any]) -> EntityRows:
-        """A row a frame, on two timelines: the frames' numbers, and the source's times."""
+        """One row per frame, on two timelines: the frames' numbers, and the source's times."""
         column = self._rerun.TimeColumn
         numbers = np.array([frame.number for frame in frames], np.int64)
         times = np.array([frame.ns for frame in frames], "timedelta64[ns]")
@@ -98,7 +98,7 @@ class RerunRows:
         return [*points.partition(lengths), *self._own("Markers", columns).partition(lengths)]
 
     def _arrows(self, records: Records) -> Any:
-        """Displacements as arrows that end at the markers, of the markers that have one."""
+        """Displacements as arrows that end at the markers, of markers with a displacement."""
         ends = _joined(records, _POSITION).reshape(*records.shape, 3)
         moved = _joined(records, _VECTORS["displacement"]).reshape(ends.shape)
         known = np.isfinite(ends).all(axis=2) & np.isfinite(moved).all(axis=2)
@@ -113,7 +113,7 @@ class RerunRows:
         return [*log, *self._own("Diagnostics", values)]
 
     def _images(self, frames: Iterable[RecordedFrame]) -> Iterator[EntityRows]:
-        """Each image, and beside it what is known of its cameras; an entity holds the frames that have it."""
+        """Each image and its cameras; an entity has the frames with this image."""
         images: dict[str, list[tuple[RecordedFrame, FrameImage]]] = {}
         cameras: dict[str, list[tuple[RecordedFrame, FrameImage, CameraView]]] = {}
         for frame in frames:

@@ -16,13 +16,14 @@ from cmpdesign.tracking.recording.frames import FrameReader, RecordedFrame
 from cmpdesign.tracking.recording.images import kept_image
 from cmpdesign.tracking.recording.rerun_rows import APPLICATION, RerunRows
 
-IMAGES_AT_ONCE = 16  # frames that are in memory together with their images
+IMAGES_AT_ONCE = 16  # number of frames that are in memory with their images
 
 
 def write_rrd(chunks: Iterable[Columns], about: Columns, path: Path, images: Path) -> None:
-    """Write a .rrd file; it is complete on disk before it has its name.
+    """Write a .rrd file; the file is complete on disk before it gets its name.
 
-    Its bytes differ from run to run: Rerun gives its rows identifiers with a time. Its identifier does not: the same
+    The bytes differ from run to run: Rerun gives its rows identifiers with a time. The recording's identifier does not
+        differ: the same
     run is the same recording to a viewer.
 
     Args:
@@ -32,7 +33,7 @@ def write_rrd(chunks: Iterable[Columns], about: Columns, path: Path, images: Pat
         images: folder of the kept images.
 
     Raises:
-        OSError: it cannot be written; what is at the place is unchanged.
+        OSError: the file cannot be written; an existing file is unchanged.
     """
     reader = FrameReader()
     frames = chain.from_iterable(
@@ -52,7 +53,7 @@ def _write_file(path: Path, frames: Iterable[RecordedFrame], frame_id: str) -> N
     try:
         stream.write_rrd(path, application_id=APPLICATION, recording_id=_identifier(first, frame_id))
     except (RuntimeError, ValueError) as error:  # Rerun's, of a file that it cannot write
-        raise OSError(0, f"Rerun says: {error}") from None
+        raise OSError(0, f"Rerun reports: {error}") from None
 
 
 def _chunks(groups: Iterable[Sequence[RecordedFrame]], frame_id: str) -> Iterator[Any]:

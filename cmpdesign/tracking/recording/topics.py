@@ -1,4 +1,4 @@
-"""A frame as messages on topics, in ROS's encoding CDR: what a recording holds, and what a live server sends."""
+"""A frame as messages on topics, in ROS's encoding CDR: the content of recordings and of live servers."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def image_topic(base: str) -> str:
 
 
 def camera_topic(base: str) -> str:
-    """The topic of what is known of a camera; see ``CameraView``."""
+    """The topic of a camera's intrinsics; see ``CameraView``."""
     return f"/{base}/camera_info"
 
 
@@ -81,7 +81,7 @@ class TopicMessages:
         return kinds
 
     def of(self, frame: RecordedFrame) -> Iterator[TopicMessage]:
-        """The messages of a frame: markers, diagnostics, images, and beside each image its cameras."""
+        """The messages of a frame: markers, diagnostics, images, and the cameras of each image."""
         make, stamp = self._messages, Stamp(frame.ns, self._frame_id)
         yield self._message(self.points_topic, POINTS, make.points(stamp, frame.markers), frame.ns)
         report = make.diagnostics(stamp, frame.level, frame.text, frame.values)

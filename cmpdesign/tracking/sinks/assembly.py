@@ -20,7 +20,7 @@ def assemble_table(chunks: Sequence[Chunk], about: Columns, path: Path) -> int:
     """Write chunks into one file; the number of frames.
 
     Args:
-        chunks: whole chunks in order.
+        chunks: complete chunks in order.
         about: the columns that all frames share.
         path: the table, .npz or .parquet; or a recording, which needs the columns of a ``RecordedTable``.
 

@@ -20,7 +20,7 @@ _ABOUT = "about."
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A whole chunk.
+    """A complete chunk.
 
     Attributes:
         path: its file.
@@ -38,8 +38,8 @@ class FoundChunks:
     """The chunks of a folder.
 
     Attributes:
-        chunks: the whole chunks in order.
-        about: the shared columns of the last whole chunk; None without a chunk.
+        chunks: the complete chunks in order.
+        about: the shared columns of the last complete chunk; None without a chunk.
         problems: one sentence on each damaged chunk and on each gap.
     """
 
@@ -49,7 +49,7 @@ class FoundChunks:
 
 
 def save_chunk(path: Path, frames: Columns, about: Columns) -> None:
-    """Write the columns of frames with the shared columns; the file is complete on disk or not there.
+    """Write the columns of frames with the shared columns; the file is complete on disk or does not exist.
 
     Raises:
         OSError: the file cannot be written.
@@ -83,13 +83,13 @@ def _whole_chunk(path: Path, columns: Columns, first: Chunk | None) -> Chunk:
     """Raises ``ValueError`` for columns that are not those of one run."""
     frames = {name: values for name, values in columns.items() if not name.startswith(_ABOUT)}
     if _ABOUT + "format" not in columns or "frame" not in frames:
-        raise ValueError("it holds no frames")
+        raise ValueError("the chunk holds no frames")
     numbers = frames["frame"]
     kinds = {name: (values.dtype, values.shape[1:]) for name, values in frames.items()}
     if any(values.shape[:1] != numbers.shape for values in frames.values()):
-        raise ValueError("its columns differ in length")
+        raise ValueError("the columns differ in length")
     if first is not None and kinds != first.kinds:
-        raise ValueError(f"its columns are not those of {first.path.name}")
+        raise ValueError(f"the columns are not those of {first.path.name}")
     return Chunk(path, numbers, kinds)
 
 
@@ -101,7 +101,7 @@ def _gaps(chunks: list[Chunk], is_end_lost: bool) -> list[str]:
 
 
 def read_column(chunk: Chunk, name: str) -> NDArray[Any]:
-    """One column of the frames of a whole chunk.
+    """One column of the frames of a complete chunk.
 
     Raises:
         InputError, NpzError: the chunk changed since it was found.
@@ -110,7 +110,7 @@ def read_column(chunk: Chunk, name: str) -> NDArray[Any]:
 
 
 def read_frames(chunk: Chunk) -> Columns:
-    """The columns of the frames of a whole chunk.
+    """The columns of the frames of a complete chunk.
 
     Raises:
         InputError, NpzError: the chunk changed since it was found.

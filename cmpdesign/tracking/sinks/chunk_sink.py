@@ -21,7 +21,7 @@ class ChunkSink:
     """Writes frames in chunks of some seconds, which are assembled at the end.
 
     Args:
-        path: the file to come.
+        path: the file to write at the end.
         table: the frames' columns.
         with_images: keep the frames' images beside the chunks, for a recording.
     """
@@ -43,7 +43,7 @@ class ChunkSink:
             self._flush()
 
     def _keep_images(self, frame: int, image: Any) -> None:
-        """Images are written before the chunk of their frame, so that every whole chunk has its images."""
+        """Images are written before the chunk of their frame, so that every complete chunk has its images."""
         try:
             keep_images(self._part, frame, image)
         except OSError as error:
@@ -91,4 +91,4 @@ class ChunkSink:
     def kept(self) -> str:
         if not self._part.exists():
             return f"{self._kept} frames are kept in {self._path}"
-        return f"{self._kept} frames are kept in {self._part}; make room, then call with --recover"
+        return f"{self._kept} frames are kept in {self._part}; free disk space, then call with --recover"

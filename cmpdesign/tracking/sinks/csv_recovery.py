@@ -1,4 +1,4 @@
-"""Whole frames of a CSV file that a killed run left."""
+"""Complete frames of the CSV file of a killed run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _COPY_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class _Frame:
-    """The rows of one frame: its number (None for rows that name no frame), and where they lie in the file."""
+    """The rows of one frame: its number (None for rows without a frame number), and their place in the file."""
 
     number: int | None
     start: int
@@ -25,12 +25,12 @@ class _Frame:
 
 
 def recover_csv(part: Path, path: Path, rows_per_frame: int) -> Recovered:
-    """Keep the whole frames of a text, and rename it to the table.
+    """Keep the complete frames of a text, and rename the text to the table.
 
     Args:
         part: the text of the killed run.
         path: the table.
-        rows_per_frame: number of rows of a whole frame.
+        rows_per_frame: number of rows of a complete frame.
 
     Raises:
         InputError: the text cannot be opened.
@@ -40,7 +40,7 @@ def recover_csv(part: Path, path: Path, rows_per_frame: int) -> Recovered:
         head = len(file.readline())
         frames = list(_frames_in(file, head))
     whole = [frame for frame in frames if frame.number is not None and frame.rows == rows_per_frame]
-    # The last frame of a killed run may be cut; that is not damage.
+    # The last frame of a killed run may be incomplete; this is no damage.
     others = [frame for frame in (frames[:-1] if whole else frames) if frame not in whole]
     problems = tuple(_describe(frame, rows_per_frame) for frame in others)
     if not whole:
@@ -75,7 +75,7 @@ def _frames_in(file: BinaryIO, start: int) -> Iterator[_Frame]:
 
 
 def _rows_in(file: BinaryIO, start: int) -> Iterator[tuple[int | None, int]]:
-    """The frame number of every row, and where the row ends; no field holds a line break, see ``head_columns``."""
+    """The frame number of every row, and the end of the row; no field holds a line break, see ``head_columns``."""
     end = start
     for row in file:
         end += len(row)

@@ -81,7 +81,7 @@ def _csv_lines(columns: Columns, digits: Mapping[str, int]) -> bytes:
 
 
 def _plain_cell(text: str) -> str:
-    """The text of a cell; an apostrophe keeps spreadsheets from reading it as a formula."""
+    """The text of a cell; with an apostrophe, spreadsheets do not read the text as a formula."""
     return f"'{text}" if text.startswith(FORMULA_STARTS) else text
 
 

@@ -38,7 +38,7 @@ class FrameSink(Protocol):
 
 
 def open_sink(path: Path, table: FrameTable, recording: Recording | None = None) -> FrameSink:
-    """Open the sink for the suffix of a file. The place of a killed run that holds no frame is cleared.
+    """Open the sink for the suffix of a file. Unfinished files of a killed run without a frame are removed.
 
     Args:
         path: a file's name with an ending of ``KINDS``; or a name without ending, for a rosbag2 folder.
@@ -59,7 +59,7 @@ def open_sink(path: Path, table: FrameTable, recording: Recording | None = None)
         )
     part = part_path(path)
     if is_folder(path):
-        raise OutputError(f"{path}: is a folder; give a file's name, or that of a new folder")
+        raise OutputError(f"{path} is a folder; give a file's name, or that of a new folder")
     if os.path.lexists(part):
         _require_not_in_use(part, path)
         if _holds_frames(part):
@@ -79,20 +79,20 @@ def open_sink(path: Path, table: FrameTable, recording: Recording | None = None)
 
 
 def recover_table(path: Path, rows_per_frame: int) -> Recovered:
-    """Complete the file of an interrupted run from its chunks or its text; what cannot be read is left out.
+    """Complete the file of an interrupted run from its chunks or its text; damaged parts are left out.
 
     Args:
         path: the table.
         rows_per_frame: number of rows of a frame in the long form.
 
     Raises:
-        CmpDesignError: no interrupted run, a run that still goes on, or no whole frame is left.
+        CmpDesignError: no interrupted run, a run that still writes, or no complete frame.
         OutputError: the file cannot be written; the chunks or the text are kept.
     """
     _require_kind(path)
     part = part_path(path)
     if not os.path.lexists(part):
-        raise CmpDesignError(f"{part}: there is nothing to recover")
+        raise CmpDesignError(f"{part}: there is no table to recover")
     _require_not_in_use(part, path)
     try:
         recovered = (
@@ -102,7 +102,7 @@ def recover_table(path: Path, rows_per_frame: int) -> Recovered:
         if not recovered.frames and recovered.problems:
             first, *others = recovered.problems
             more = f"; and {len(others)} more" if others else ""
-            raise CmpDesignError(f"{part} holds no whole frame ({first}{more}); it is kept")
+            raise CmpDesignError(f"{part} holds no complete frame ({first}{more}); it is kept")
         _remove(part)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); {part} is kept") from None
@@ -118,7 +118,7 @@ def _recover_chunks(part: Path, path: Path) -> Recovered:
 
 def _require_kind(path: Path) -> None:
     if not path.name:
-        raise CmpDesignError(f"{path}: is a folder; give a file's name, or that of a new folder")
+        raise CmpDesignError(f"{path} is a folder; give a file's name, or that of a new folder")
     if path.suffix not in (*KINDS, ""):
         raise CmpDesignError(
             f"{path}: unknown ending; expected one of {', '.join(KINDS)}, or none for a rosbag2 folder"
@@ -136,7 +136,7 @@ def _require_kind(path: Path) -> None:
 
 
 def _require_not_in_use(part: Path, path: Path) -> None:
-    """Check that the unfinished table is one of this program, and that no run writes it."""
+    """Check that the unfinished table was made by this program, and that no run writes it."""
     if part.is_symlink() or not (is_regular_file if path.suffix == ".csv" else is_folder)(part):
         kind = "text" if path.suffix == ".csv" else "folder"
         raise CmpDesignError(

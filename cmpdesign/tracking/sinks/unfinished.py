@@ -1,4 +1,4 @@
-"""The unfinished table of a run: its place, its lock, and what is recovered of it."""
+"""The unfinished table of a run: place, lock, and result of a recovery."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import Any
 from cmpdesign.files.locks import open_for_lock, try_lock
 from cmpdesign.libraries import extra
 
-# Largest time between two flushes to disk, s: frames of this time are lost with the power.
+# Largest time between two flushes to disk, s: frames of this time are lost in a power cut.
 FLUSH_S = 5.0
 
 
 @dataclass(frozen=True)
 class Recovered:
-    """What was recovered.
+    """The result of a recovery.
 
     Attributes:
-        frames: number of whole frames in the table; without any, no table was written.
+        frames: number of complete frames in the table; with 0, no table was written.
         problems: one sentence on each damaged chunk or frame and on each gap.
     """
 
@@ -28,12 +28,14 @@ class Recovered:
 
 
 def part_path(path: Path) -> Path:
-    """The place of a table's frames while the run goes on."""
+    """The place of a table's frames during the run."""
     return path.with_name(path.name + ".part")
 
 
 def lock_folder(path: Path) -> int | None:
-    """Lock a folder; the descriptor that holds the lock until it is closed, where the system gives one."""
+    """Lock a folder; return the descriptor that holds the lock until it is closed, where the system gives a
+    descriptor.
+    """
     descriptor = open_for_lock(path)
     if descriptor is not None:
         try_lock(descriptor)

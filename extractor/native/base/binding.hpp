@@ -7,9 +7,9 @@
 #pragma once
 
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 
 #include <array>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -17,11 +17,9 @@
 #include <utility>
 #include <vector>
 
-#ifdef CMP_NEEDS_V3
-#include <cpuid.h>
-#endif
-
 #include "array.hpp"
+#include "numpy_arrays.hpp"
+#include "processor.hpp"
 
 namespace cmp {
 
@@ -38,13 +36,14 @@ struct Name {
 // The arrays that a call has borrowed from Python; given back when the call ends.
 class Borrowed {
  public:
-  Borrowed() { buffers_.reserve(16); }
+  Borrowed() { objects_.reserve(64); }
   Borrowed(const Borrowed&) = delete;
   Borrowed& operator=(const Borrowed&) = delete;
   ~Borrowed() {
     for (Py_buffer& buffer : buffers_) PyBuffer_Release(&buffer);
   }
   const Py_buffer& add(PyObject* object, bool is_written, const Name& name) {
+    note_changeable();
     Py_buffer& buffer = buffers_.emplace_back();
     int flags = PyBUF_STRIDES | PyBUF_FORMAT | (is_written ? PyBUF_WRITABLE : 0);
     if (PyObject_GetBuffer(object, &buffer, flags) != 0) {
@@ -55,11 +54,20 @@ class Borrowed {
     }
     return buffer;
   }
+  void add_array(nb::handle array) {
+    note_changeable();
+    keep(nb::borrow(array));
+  }
   void keep(nb::object object) { objects_.push_back(std::move(object)); }
+
+  // Notes that something was read that may change later: an array, or an object that is no tuple.
+  void note_changeable() { ++changeable_; }
+  std::size_t changeable() const { return changeable_; }
 
  private:
   std::vector<Py_buffer> buffers_;
   std::vector<nb::object> objects_;
+  std::size_t changeable_ = 0;
 };
 
 template <class T>
@@ -96,21 +104,44 @@ struct FromPython<View<T, N>> {
   using Value = std::remove_const_t<T>;
 
   static View<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    if (const NumpyArray* array = fitting_array(object.ptr())) {
+      borrowed.add_array(object);
+      return strided({reinterpret_cast<T*>(array->data), array->shape, array->strides}, name);
+    }
     const Py_buffer& buffer = borrowed.add(object.ptr(), !std::is_const_v<T>, name);
     if (buffer.ndim != N || !has_dtype<Value>(buffer)) refuse(buffer, name);
+    return strided({static_cast<T*>(buffer.buf), buffer.shape, buffer.strides}, name);
+  }
+
+ private:
+  // The memory of an array.
+  struct Memory {
+    T* data;
+    const Py_ssize_t *shape, *strides;  // strides in bytes
+  };
+
+  // The array of NumPy that an object is, of the right type and dimensions; null for others.
+  static const NumpyArray* fitting_array(PyObject* object) {
+    const NumpyArray* array = Numpy::get().array(object);
+    const bool is_fitting = array != nullptr && array->dimensions == N && Numpy::has_type<Value>(*array) &&
+                            (std::is_const_v<T> || Numpy::is_writable(*array));
+    return is_fitting ? array : nullptr;
+  }
+
+  static View<T, N> strided(const Memory& memory, const Name& name) {
     std::array<Index, N> shape, stride;
+    std::copy_n(memory.shape, N, shape.begin());
+    if (std::find(shape.begin(), shape.end(), 0) != shape.end()) return {memory.data, shape};
     for (int k = 0; k < N; ++k) {
-      shape[k] = buffer.shape[k];
-      stride[k] = buffer.strides[k] / static_cast<Index>(sizeof(T));
-      bool is_whole = buffer.strides[k] % static_cast<Py_ssize_t>(sizeof(T)) == 0;
+      stride[k] = memory.strides[k] / static_cast<Index>(sizeof(T));
+      bool is_whole = memory.strides[k] % static_cast<Py_ssize_t>(sizeof(T)) == 0;
       bool has_gap = k == N - 1 && shape[k] > 1 && stride[k] != 1;
       if (!is_whole || has_gap)
         throw nb::type_error((name.text() + " has gaps within its rows; give a contiguous array").c_str());
     }
-    return {static_cast<T*>(buffer.buf), shape, stride};
+    return {memory.data, shape, stride};
   }
 
- private:
   [[noreturn]] static void refuse(const Py_buffer& buffer, const Name& name) {
     std::string text = name.text() + " must be " + dtype_name<Value>() + " of " + std::to_string(N) +
                        " dimensions, and is '" + (buffer.format == nullptr ? "B" : buffer.format) + "' of " +
@@ -202,8 +233,21 @@ concept Record = requires(const Fields& fields) {
 
 template <Record T>
 struct FromPython<T> {
+  // A tuple of nothing but numbers and such tuples, as limits are, is read once.
   static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
-    return T::read(Fields(object, name, borrowed));
+    static PyObject* last = nullptr;  // is kept, so that no other object gets its address
+    static std::optional<T> record;
+    if (object.ptr() == last) return *record;
+    if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
+    const std::size_t before = borrowed.changeable();
+    T found = T::read(Fields(object, name, borrowed));
+    if (PyTuple_Check(object.ptr()) != 0 && borrowed.changeable() == before) {
+      Py_INCREF(object.ptr());
+      Py_XDECREF(last);
+      last = object.ptr();
+      record.emplace(found);
+    }
+    return found;
   }
 };
 
@@ -212,6 +256,7 @@ template <class T, std::size_t N>
 struct FromPython<std::array<T, N>> {
   static std::array<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
     std::array<T, N> values;
+    if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
     if (PySequence_Check(object.ptr()) == 0 || nb::len(object) != N)
       throw nb::type_error((name.text() + " must have " + std::to_string(N) + " items").c_str());
     for (std::size_t k = 0; k < N; ++k) values[k] = FromPython<T>::get(nb::object(object[k]), name, borrowed);
@@ -221,12 +266,12 @@ struct FromPython<std::array<T, N>> {
 
 template <class T, int N>
 nb::object to_python(Array<T, N>&& array) {
-  std::array<std::size_t, N> shape;
-  for (int k = 0; k < N; ++k) shape[k] = static_cast<std::size_t>(array.size(k));
+  std::array<Py_ssize_t, N> shape;
+  std::copy(array.shape().begin(), array.shape().end(), shape.begin());
   T* data = array.release();
   if (data == nullptr) data = new T[1];
   nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
-  return nb::cast(nb::ndarray<nb::numpy, T>(data, N, shape.data(), owner));
+  return Numpy::get().create(data, N, shape.data(), std::move(owner));
 }
 
 template <class T>
@@ -241,25 +286,10 @@ nb::object to_python(std::tuple<T...>&& values) {
                     std::move(values));
 }
 
-#ifdef CMP_NEEDS_V3
-// Whether processor and system have AVX2, FMA and BMI2. Asked of the processor itself: __builtin_cpu_supports
-// of zig's library answers no on every processor.
-inline bool has_v3() {
-  constexpr unsigned FMA = 1U << 12, SAVED_BY_SYSTEM = 1U << 27, AVX2 = 1U << 5, BMI2 = 1U << 8,
-                     YMM_STATE = 6;
-  unsigned a = 0, b = 0, c = 0, d = 0;
-  if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & FMA) || !(c & SAVED_BY_SYSTEM)) return false;
-  unsigned low = 0, high = 0;
-  asm("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
-  return (low & YMM_STATE) == YMM_STATE && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & AVX2) &&
-         (b & BMI2);
-}
-#endif
-
 // Refuses to go on where the processor lacks the instructions that the loops were compiled for.
 inline void require_processor() {
 #ifdef CMP_NEEDS_V3
-  if (!has_v3())
+  if (!ProcessorFlags().has_v3())
     throw nb::import_error(
         "this build needs a processor with AVX2, FMA and BMI2 (x86-64-v3); for older ones build with "
         "pip install . -C cmake.define.CMP_CPU=x86-64");
@@ -304,6 +334,7 @@ struct Bound<F, Result (*)(Arguments...)> {
 // Makes a function known to Python under a name, with the names of its arguments.
 template <auto F>
 void bind(nb::module_& module, const char* name, typename Bound<F, decltype(F)>::Names names) {
+  Numpy::get();  // imported here, as an import within a call could wait for another thread
   module.def(
       name, [name, names](const nb::args& given) { return Bound<F, decltype(F)>::call(name, names, given); });
 }

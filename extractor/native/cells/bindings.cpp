@@ -1,4 +1,4 @@
-// Room "cells" as Python sees it.
+// Room "cells" for Python.
 #include "base/binding.hpp"
 
 #include "cells/cell_mesh.hpp"

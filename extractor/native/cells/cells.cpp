@@ -113,8 +113,7 @@ std::vector<Index> small_cells(View<const double, 1> area, double share, Index m
   Array<double, 1> sorted(area);
   const Index last =
       area.size() - max_larger;  // cells for which fewer are larger in the whole image need none
-  std::nth_element(sorted.begin(), sorted.begin() + last, sorted.end());
-  const double limit = share * sorted[last];
+  const double limit = share * numeric::select(sorted, last);
   std::vector<Index> small;
   for (Index i = 0; i < area.size(); ++i)
     if (area[i] < limit) small.push_back(i);

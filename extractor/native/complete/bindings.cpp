@@ -1,4 +1,4 @@
-// Room "complete" as Python sees it.
+// Room "complete" for Python.
 #include "base/binding.hpp"
 
 #include "complete/consistency_filter.hpp"

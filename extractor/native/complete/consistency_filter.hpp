@@ -29,7 +29,7 @@ struct ConsistencyLimits {
   }
 };
 
-// Results of earlier stages by which markers are judged, for each of M markers.
+// Results of earlier stages for the tests of markers, for each of M markers.
 struct MarkerEvidence {
   View<const bool, 1> explained;  // (M,) synthesis explains the image around the marker
   View<const double, 1> edge_px;  // (M,) the mean edge at the marker

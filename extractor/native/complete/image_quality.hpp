@@ -1,4 +1,4 @@
-// The quality of an image, measured at the middles of cells: what limits the reading of its markers.
+// The quality of an image, measured at the middles of cells: the properties that limit the reading.
 #pragma once
 
 #include "image/pyramid.hpp"

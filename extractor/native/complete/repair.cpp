@@ -16,6 +16,7 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint8_t LOST = 0, MEASURED = 1, REPAIRED = 2, FITTED = 3;
 
 using layout::RingTables;
+using localmap::MarkerPredictions;
 using Flags = Array<bool, 1>;
 
 double square(double x) { return x * x; }
@@ -41,41 +42,15 @@ Array<double, 1> interpolated_edges(View<const double, 1> edge_px, View<const st
   return out;
 }
 
-// Predictions of M markers by the markers around them, NaN where unknown.
-struct RingPrediction {
-  localmap::MarkerPredictions both;  // by two rings
-  Array<double, 2> inner_xy_px;      // (M, 2) by the inner ring alone
-
-  RingPrediction(View<const double, 2> known, View<const bool, 1> wanted, const RingTables& tables,
-                 const RepairLimits& limits)
-      : both(localmap::predict_markers(known, wanted, tables.marker_mm, tables.neighbours, limits.maps)),
-        inner_xy_px(localmap::predict_markers(known, wanted, tables.marker_mm, tables.first_ring, limits.maps)
-                        .xy_px) {}
-};
-
 // The variance of a lost marker's place by the two rings around it, px^2; NaN where the place is not safe.
-double variance_by_neighbours(Index m, const RingPrediction& rings, double edge_px,
+double variance_by_neighbours(Index m, const MarkerPredictions& rings, double edge_px,
                               const RepairLimits& limits) {
-  const double variance = rings.both.variance_px2[m], leverage = rings.both.leverage[m];
-  const auto place = rings.both.xy_px[m], inner = rings.inner_xy_px[m];
-  const double dx = place[0] - inner[0], dy = place[1] - inner[1];
-  // where the inner ring alone predicts another place, the surface is too bent for both predictions
-  const bool unconfirmed = std::isnan(inner[0]);
-  const double ring_error = square(limits.outer_ring_error * edge_px);
-  const double model_error = unconfirmed ? ring_error : (dx * dx + dy * dy) / 4;
-  const double upper_bound =
-      variance * (1 + leverage) + square(limits.model_deviation * edge_px) + model_error;
-  if (rings.both.neighbour_count[m] < limits.mild_support ||
+  const double variance = rings.variance_px2[m], leverage = rings.leverage[m];
+  const double upper_bound = variance * (1 + leverage) + square(limits.model_deviation * edge_px);
+  if (rings.neighbour_count[m] < limits.mild_support ||
       !(leverage < limits.max_leverage && upper_bound < square(limits.max_repaired_deviation * edge_px)))
     return NOT_A_NUMBER;
-  const double outer_error = unconfirmed ? 0.25 * ring_error : 0.0;
-  return square(limits.mild_error * leverage) * variance + outer_error;
-}
-
-// The same where the surface is bent, but the rings are nearly whole, from the residual of a cubic, px^2.
-double variance_by_cubic(double residual, double edge_px, const RepairLimits& limits) {
-  const double variance = square(limits.cubic_error) * residual + square(limits.model_deviation * edge_px);
-  return variance < square(limits.max_repaired_deviation * edge_px) ? variance : NOT_A_NUMBER;
+  return square(limits.mild_error * leverage) * variance;
 }
 
 // The same by the quadratic through the marker's layer, from the variance of its residual, px^2.
@@ -90,15 +65,15 @@ double variance_by_layer(double residual, double edge_px, const RepairLimits& li
 //
 // NaN where the markers around predict another place, and at the image's border, which cuts cells. Where
 // gridlines bend sharply, the prediction by markers is hardly better.
-double variance_by_cells(Index m, const RingPrediction& rings, View<const double, 1> implied, double edge_px,
-                         const ImageSize& size, const RepairLimits& limits) {
+double variance_by_cells(Index m, const MarkerPredictions& rings, View<const double, 1> implied,
+                         double edge_px, const ImageSize& size, const RepairLimits& limits) {
   const double x = implied[0], y = implied[1];
-  const double variance = rings.both.variance_px2[m], leverage = rings.both.leverage[m];
-  const double distance2 = square(x - rings.both.xy_px(m, 0)) + square(y - rings.both.xy_px(m, 1));
+  const double variance = rings.variance_px2[m], leverage = rings.leverage[m];
+  const double distance2 = square(x - rings.xy_px(m, 0)) + square(y - rings.xy_px(m, 1));
   const double right = static_cast<double>(size[0] - 1) - x, bottom = static_cast<double>(size[1] - 1) - y;
   const bool inside = std::min(std::min(std::min(x, y), right), bottom) > limits.border_width * edge_px;
   const double limit2 = square(limits.max_implied_distance * edge_px);
-  if (!(inside && rings.both.neighbour_count[m] >= limits.min_rim_support && distance2 < limit2))
+  if (!(inside && rings.neighbour_count[m] >= limits.min_rim_support && distance2 < limit2))
     return NOT_A_NUMBER;
   const double predicted_variance = variance * (1 + leverage),
                own = square(limits.implied_deviation * edge_px);
@@ -134,25 +109,30 @@ class Repair {
       wanted[m] = lost_[m] || uncertain;
       if (uncertain) known_[m].fill(NOT_A_NUMBER);
     }
-    RingPrediction rings(known_, wanted, tables_, limits_);
+    auto rings = predictions(wanted);
     fill_by_rings(rings, wanted);
     add_fused_markers();
     if (is_any(lost_) && is_any(Flags(markers_.uncertain))) {
-      rings = RingPrediction(known_, lost_, tables_, limits_);
+      rings = predictions(lost_);
       for_lost([&](Index m) {
-        lost_[m] = !fill(m, rings.both.xy_px[m], variance_by_neighbours(m, rings, edge_px_[m], limits_));
+        lost_[m] = !fill(m, rings.xy_px[m], variance_by_neighbours(m, rings, edge_px_[m], limits_));
       });
     }
     for_lost([&](Index m) {
       const auto implied = markers_.implied_px[m];
       lost_[m] = !fill(m, implied, variance_by_cells(m, rings, implied, edge_px_[m], size_, limits_));
     });
-    if (is_any(lost_)) fill_remaining(rings);
+    if (is_any(lost_)) fill_by_layer();
     drop_outside();
     return std::move(status_);
   }
 
  private:
+  // by two rings, NaN where unknown
+  MarkerPredictions predictions(View<const bool, 1> wanted) const {
+    return localmap::predict_markers(known_, wanted, tables_.marker_mm, tables_.neighbours, limits_.maps);
+  }
+
   template <class Visit>
   void for_lost(Visit visit) {
     for (Index m = 0; m < count_; ++m)
@@ -169,11 +149,11 @@ class Repair {
     return variance >= 0.0 && is_inside_image(place[0], place[1], size_);
   }
 
-  void fill_by_rings(const RingPrediction& rings, const Flags& wanted) {
+  void fill_by_rings(const MarkerPredictions& rings, const Flags& wanted) {
     for (Index m = 0; m < count_; ++m) {
       if (!wanted[m]) continue;
       const double variance = variance_by_neighbours(m, rings, edge_px_[m], limits_);
-      const auto place = rings.both.xy_px[m];
+      const auto place = rings.xy_px[m];
       if (lost_[m]) {
         lost_[m] = !fill(m, place, variance);
         status_[m] = REPAIRED;
@@ -191,17 +171,11 @@ class Repair {
     }
   }
 
-  // the weaker and slower predictions, only for the remaining markers
-  void fill_remaining(const RingPrediction& rings) {
-    Flags dense({count_});
-    for (Index m = 0; m < count_; ++m)
-      dense[m] = lost_[m] && rings.both.neighbour_count[m] >= limits_.maps.min_cubic_neighbours;
-    const auto by_cubic =
-        localmap::cubic_variance(known_, dense, tables_.marker_mm, tables_.neighbours, limits_.maps);
+  // the weakest and slowest prediction, only for the remaining markers
+  void fill_by_layer() {
     const auto [layer_xy, layer_variance] = predict_by_layer(known_, tables_.layers, limits_.layers);
     for (Index m = 0; m < count_; ++m) {
-      if (!lost_[m] || fill(m, rings.both.xy_px[m], variance_by_cubic(by_cubic[m], edge_px_[m], limits_)))
-        continue;
+      if (!lost_[m]) continue;
       status_[m] = FITTED;
       fill(m, layer_xy[m], variance_by_layer(layer_variance[m], edge_px_[m], limits_));
     }

@@ -17,8 +17,8 @@ struct RepairLimits {
   double max_implied_distance, implied_deviation, max_implied_sigmas, border_width;
   std::int64_t mild_support, min_rim_support;
   double max_repaired_deviation, max_fitted_deviation, max_leverage, max_rim_leverage;
-  double outer_ring_error, model_deviation, fitted_model_sigmas;
-  double mild_error, heavy_error, cubic_error;
+  double model_deviation, fitted_model_sigmas;
+  double mild_error, heavy_error;
   LayerLimits layers;
   layout::NeighbourMapLimits maps;
 
@@ -34,18 +34,16 @@ struct RepairLimits {
             f["max_fitted_deviation"],
             f["max_leverage"],
             f["max_rim_leverage"],
-            f["outer_ring_error"],
             f["model_deviation"],
             f["fitted_model_sigmas"],
             f["mild_error"],
             f["heavy_error"],
-            f["cubic_error"],
             f["layers"],
             f["maps"]};
   }
 };
 
-// What is known of M markers before repair.
+// M markers before repair.
 struct UnrepairedMarkers {
   View<double, 2> xy_px;             // (M, 2) NaN where lost; written
   View<double, 3> cov_px2;           // (M, 2, 2) NaN where lost; written

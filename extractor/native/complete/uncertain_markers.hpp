@@ -1,4 +1,4 @@
-// Uncertain markers, as under dirt: the measurement is fused with the prediction by other markers.
+// Uncertain markers, as under dirt: the measurement is combined with the prediction by other markers.
 #pragma once
 
 #include <tuple>

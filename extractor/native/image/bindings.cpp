@@ -1,4 +1,4 @@
-// Room "image" as Python sees it.
+// Room "image" for Python.
 #include "base/binding.hpp"
 
 #include "image/color.hpp"

@@ -15,12 +15,11 @@ inline constexpr Index RING_MARKERS = 18;  // in two rings
 // Limits of maps through neighbours; explained in extractor/layout/neighbour_tables.py.
 struct NeighbourMapLimits {
   double min_pivot;
-  Index min_linear_neighbours, min_quadratic_neighbours, min_cubic_neighbours;
+  Index min_linear_neighbours, min_quadratic_neighbours;
 
   template <class F>
   static NeighbourMapLimits read(const F& f) {
-    return {f["min_pivot"], f["min_linear_neighbours"], f["min_quadratic_neighbours"],
-            f["min_cubic_neighbours"]};
+    return {f["min_pivot"], f["min_linear_neighbours"], f["min_quadratic_neighbours"]};
   }
 };
 

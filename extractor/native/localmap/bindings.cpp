@@ -1,4 +1,4 @@
-// Room "localmap" as Python sees it.
+// Room "localmap" for Python.
 #include "base/binding.hpp"
 
 #include "localmap/affine_maps.hpp"

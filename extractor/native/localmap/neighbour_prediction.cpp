@@ -10,104 +10,6 @@ namespace cmp::localmap {
 namespace {
 
 constexpr double NOWHERE = std::numeric_limits<double>::quiet_NaN();
-constexpr double INFINITE = std::numeric_limits<double>::infinity();
-constexpr Index CUBIC_TERMS = 10;      // 1, x, y, x^2, xy, y^2, x^3, x^2 y, x y^2, y^3
-constexpr double SMALLEST_MM = 1e-12;  // to divide by
-
-using CubicTerms = std::array<double, CUBIC_TERMS>;
-using CubicMatrix = std::array<CubicTerms, CUBIC_TERMS>;
-
-// A known neighbour: its place in the layout, relative to the marker, and in the image, px.
-struct Neighbour {
-  double x, y, u, v;
-};
-
-// The known neighbours of one marker.
-struct Neighbours {
-  std::array<Neighbour, layout::RING_MARKERS> items;
-  Index count = 0;
-};
-
-// Replaces a matrix by its Cholesky factor; false when the neighbours do not determine the map.
-bool update_to_cholesky_factor(CubicMatrix& matrix, double min_pivot) {
-  for (Index i = 0; i < CUBIC_TERMS; ++i)
-    for (Index j = 0; j <= i; ++j) {
-      double total = matrix[i][j];
-      for (Index k = 0; k < j; ++k) total -= matrix[i][k] * matrix[j][k];
-      if (i != j) {
-        matrix[i][j] = total / matrix[j][j];
-        continue;
-      }
-      if (!(total > min_pivot)) return false;
-      matrix[i][i] = std::sqrt(total);
-    }
-  return true;
-}
-
-// Replaces a vector by the solution with a Cholesky factor.
-void update_to_solution(const CubicMatrix& factor, CubicTerms& vector) {
-  for (Index i = 0; i < CUBIC_TERMS; ++i) {
-    for (Index k = 0; k < i; ++k) vector[i] -= factor[i][k] * vector[k];
-    vector[i] /= factor[i][i];
-  }
-  for (Index i = CUBIC_TERMS - 1; i >= 0; --i) {
-    for (Index k = i + 1; k < CUBIC_TERMS; ++k) vector[i] -= factor[k][i] * vector[k];
-    vector[i] /= factor[i][i];
-  }
-}
-
-// The known neighbours of marker m; x and y are in units of their mean distance.
-Neighbours known_neighbours(View<const double, 2> xy_px, Index m, View<const double, 2> marker_mm,
-                            View<const std::int32_t, 2> table) {
-  Neighbours found;
-  double scale = 0.0;
-  for (const std::int32_t j : table[m]) {
-    if (j < 0 || std::isnan(xy_px(j, 0))) continue;
-    const double x = marker_mm(j, 0) - marker_mm(m, 0), y = marker_mm(j, 1) - marker_mm(m, 1);
-    found.items[found.count++] = {x, y, xy_px(j, 0), xy_px(j, 1)};
-    scale += std::hypot(x, y);
-  }
-  const double factor = static_cast<double>(found.count) / std::max(scale, SMALLEST_MM);
-  for (Index k = 0; k < found.count; ++k) {
-    found.items[k].x *= factor;
-    found.items[k].y *= factor;
-  }
-  return found;
-}
-
-CubicTerms cubic_terms(double x, double y) {
-  return {1.0, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y};
-}
-
-// The residual variance per axis, px^2, of the cubic map through the neighbours.
-double cubic_variance_of(const Neighbours& neighbours, double min_pivot) {
-  CubicMatrix normal{};
-  CubicTerms side_x{}, side_y{};
-  std::array<CubicTerms, layout::RING_MARKERS> rows;
-  for (Index k = 0; k < neighbours.count; ++k) {
-    const Neighbour& own = neighbours.items[k];
-    const CubicTerms row = cubic_terms(own.x, own.y);
-    for (Index a = 0; a < CUBIC_TERMS; ++a) {
-      side_x[a] += row[a] * own.u;
-      side_y[a] += row[a] * own.v;
-      for (Index b = 0; b <= a; ++b) normal[a][b] += row[a] * row[b];
-    }
-    rows[k] = row;
-  }
-  if (!update_to_cholesky_factor(normal, min_pivot)) return INFINITE;
-  update_to_solution(normal, side_x);
-  update_to_solution(normal, side_y);
-  double squares = 0.0;
-  for (const bool is_x : {true, false}) {
-    const CubicTerms& side = is_x ? side_x : side_y;
-    for (Index k = 0; k < neighbours.count; ++k) {
-      double misfit = is_x ? neighbours.items[k].u : neighbours.items[k].v;
-      for (Index a = 0; a < CUBIC_TERMS; ++a) misfit -= rows[k][a] * side[a];
-      squares += misfit * misfit;
-    }
-  }
-  return squares / (2.0 * static_cast<double>(neighbours.count - CUBIC_TERMS));
-}
 
 // Solves the maps in the first `count` lanes and writes the predictions of their markers.
 void fill_predictions(const std::array<Index, numeric::LANES>& members, Index count, double min_pivot,
@@ -148,19 +50,6 @@ MarkerPredictions predict_markers(View<const double, 2> xy_px, View<const bool, 
     filled = 0;
   }
   if (filled > 0) fill_predictions(members, filled, limits.min_pivot, maps, out);
-  return out;
-}
-
-Array<double, 1> cubic_variance(View<const double, 2> xy_px, View<const bool, 1> wanted,
-                                View<const double, 2> marker_mm, View<const std::int32_t, 2> table,
-                                const NeighbourMapLimits& limits) {
-  Array<double, 1> out({xy_px.size()}, INFINITE);
-  for (Index m = 0; m < wanted.size(); ++m) {
-    if (!wanted[m]) continue;
-    const Neighbours neighbours = known_neighbours(xy_px, m, marker_mm, table);
-    if (neighbours.count >= limits.min_cubic_neighbours)
-      out[m] = cubic_variance_of(neighbours, limits.min_pivot);
-  }
   return out;
 }
 

@@ -41,14 +41,4 @@ MarkerPredictions predict_markers(View<const double, 2> xy_px, View<const bool, 
                                   View<const double, 2> marker_mm, View<const std::int32_t, 2> table,
                                   const NeighbourMapLimits& limits);
 
-// (M,) px^2, the residual variance per axis of a cubic map through the neighbours of the wanted markers;
-// infinite with fewer than min_cubic_neighbours neighbours. Arguments as of predict_markers.
-//
-// Cubic terms are odd about the marker. If its rings are (nearly) complete, they hardly change a quadratic
-// prediction: on a bent surface a quadratic map has large residuals at the neighbours and is right in the
-// middle.
-Array<double, 1> cubic_variance(View<const double, 2> xy_px, View<const bool, 1> wanted,
-                                View<const double, 2> marker_mm, View<const std::int32_t, 2> table,
-                                const NeighbourMapLimits& limits);
-
 }  // namespace cmp::localmap

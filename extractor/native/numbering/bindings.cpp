@@ -1,4 +1,4 @@
-// Room "numbering" as Python sees it.
+// Room "numbering" for Python.
 #include "base/binding.hpp"
 
 #include "numbering/lattice_walk.hpp"
@@ -25,11 +25,8 @@ void add_numbering(nb::module_ module) {
                            {"image", "center", "axial", "known", "inks", "layout", "limits"});
   bind<&predicted_corners>(module, "predicted_corners",
                            {"center_px", "cell", "layout", "mirrored", "limits"});
-  bind<&cell_corners>(module, "cell_corners", {"cells", "vectors_mm", "corner_ids", "size", "limits"});
+  bind<&cell_corners>(module, "cell_corners", {"cells", "vectors_mm", "corner_ids", "limits"});
   bind<&average_corners>(module, "average_corners", {"corners", "count", "limits"});
-  bind<&update_unmatched_markers>(
-      module, "update_unmatched_markers",
-      {"xy_px", "edge_px", "agreed", "unmatched", "corners", "marker_mm", "table", "limits"});
 }
 
 }  // namespace cmp::numbering

@@ -43,7 +43,7 @@ int index_of_least(const std::array<double, 3>& values) {
 // How a cell's triangle lies on its predicted corners.
 struct TriangleFit {
   int first;  // the triangle's corner that is corner 0
-  bool is_fitted, is_clear;
+  bool is_fitted;
 };
 
 // Compares a triangle with the predicted corners, in all three rotations.
@@ -57,9 +57,7 @@ TriangleFit fit_triangle(const Triangle& triangle, const Triangle& corner, int c
     }
   const int best = index_of_least(misfit);
   const double limit = limits.max_corner_misfit * edge_px;
-  const double next = std::min(misfit[(best + 2) % 3], misfit[(best + 1) % 3]);
-  const double ratio = limits.max_ambiguity_ratio;
-  return {best, misfit[best] < limit * limit, misfit[best] < ratio * ratio * next};
+  return {best, misfit[best] < limit * limit};
 }
 
 // The corners of cell i by its map; vectors_mm (U, 3, 2) from the layout's centers to the corners.
@@ -74,13 +72,6 @@ Triangle predicted_triangle(const MappedCells& cells, Index i, View<const double
               center(i, 1) + (slope(i, 1, 0) * x + slope(i, 1, 1) * y)};
   }
   return out;
-}
-
-// The least distance of a corner from the border of an image with this last column and row, px.
-double border_distance(const Triangle& corner, double last_x, double last_y) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const PlanePoint& at : corner) nearest = std::min({nearest, at.x, at.y, last_x - at.x, last_y - at.y});
-  return nearest;
 }
 
 // (M, 4) the weighted sums of x, y and edge, and of the weights, at each marker.
@@ -100,13 +91,11 @@ Array<double, 2> corner_sums(const CellCorners& corners, Index count, double pre
   return out;
 }
 
-// Sets markers whose triangles disagree to NaN in xy (M, 2); (M,) how many triangles agree.
-Array<std::int64_t, 1> update_disagreeing_and_count(const CellCorners& corners, View<const double, 1> edge,
-                                                    View<double, 2> xy, const CornerLimits& limits) {
-  const Array<double, 2> mean{View<const double, 2>(xy)};
+// (M,) how many of the fitted triangles at each marker agree on its place (M, 2).
+Array<std::int64_t, 1> count_agreeing(const CellCorners& corners, View<const double, 2> xy,
+                                      const CornerLimits& limits) {
   const double agreed2 = limits.max_agreed_spread * limits.max_agreed_spread;
   Array<std::int64_t, 1> agreeing({xy.size()}, 0);
-  const View<const double, 2> means = mean;
   const auto agreed = agreeing.view();
   const auto ids = corners.ids;
   for (Index n = 0; n < corners.ids.size(); ++n) {
@@ -117,49 +106,26 @@ Array<std::int64_t, 1> update_disagreeing_and_count(const CellCorners& corners, 
       shortest = std::min(shortest, squared_distance(corner[k], corner[(k + 1) % 3]));
     for (int k = 0; k < 3; ++k) {
       const std::int32_t m = ids(n, k);
-      const double square = squared_distance(corner[k], point_of(means, m));
-      const double limit = limits.max_corner_spread * edge[m];
-      if (square > limit * limit) xy(m, 0) = xy(m, 1) = NOWHERE;
-      agreed[m] += square < agreed2 * shortest;
+      agreed[m] += squared_distance(corner[k], point_of(xy, m)) < agreed2 * shortest;
     }
   }
   return agreeing;
 }
 
-// (K, 3) the marker ids of the cells whose corners are all known; if most are sharp, of those kept.
-Array<std::int32_t, 2> known_cells(const CellCorners& corners, View<const double, 2> xy) {
-  const auto ids = corners.ids;
-  Array<std::int32_t, 2> cells({ids.size(), 3});
-  Index rows = 0;
-  for (Index n = 0; n < ids.size(); ++n) {
-    const std::int32_t a = ids(n, 0), b = ids(n, 1), c = ids(n, 2);
-    const bool is_known = std::isfinite(xy(a, 0)) && std::isfinite(xy(b, 0)) && std::isfinite(xy(c, 0));
-    if (is_known && (corners.is_kept[n] || !corners.is_sharp)) {
-      cells(rows, 0) = a;
-      cells(rows, 1) = b;
-      cells(rows, 2) = c;
-      ++rows;
-    }
-  }
-  return cells.first(rows);
-}
-
 }  // namespace
 
 CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> vectors_mm,
-                              View<const std::int32_t, 2> corner_ids, std::array<Index, 2> size,
-                              const CornerLimits& limits) {
+                              View<const std::int32_t, 2> corner_ids, const CornerLimits& limits) {
   Array<Index, 1> here({cells.slope.size()});
-  Index count = 0, matched = 0;
+  Index count = 0;
   for (Index i = 0; i < cells.slope.size(); ++i)
     if (std::isfinite(cells.slope(i, 0, 0))) here[count++] = i;
-  const auto last_x = static_cast<double>(size[0] - 1), last_y = static_cast<double>(size[1] - 1);
   // clockwise in the image a cell's corners run 0, 2, 1, from the back 0, 1, 2
   const int corner_step = cells.mirrored ? 1 : 2;
   Array<std::int32_t, 2> ids({count, 3});
-  Array<double, 3> corner_px({count, 3, 2}), rejected_px({count, 3, 2}, NOWHERE);
+  Array<double, 3> corner_px({count, 3, 2});
   Array<double, 1> edge({count});
-  Array<bool, 1> fitted({count}), kept({count});
+  Array<bool, 1> fitted({count});
   for (Index n = 0; n < count; ++n) {
     const Index i = here[n];
     const Triangle predicted = predicted_triangle(cells, i, vectors_mm);
@@ -174,59 +140,25 @@ CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> ve
     Triangle turned;  // by the layout's corners
     for (int k = 0; k < 3; ++k) turned[k] = triangle[(fit.first + corner_step * k) % 3];
     fill_triangle(corner_px, n, fit.is_fitted ? turned : predicted);
-    if (!fit.is_fitted && fit.is_clear) fill_triangle(rejected_px, n, turned);
     fitted[n] = fit.is_fitted;
-    matched += fit.is_fitted;
-    kept[n] = fit.is_fitted || !(border_distance(predicted, last_x, last_y) >= limits.border_px);
   }
-  const bool is_sharp = static_cast<double>(matched) > limits.min_sharp_share * static_cast<double>(count);
-  return {std::move(ids),  std::move(corner_px),   std::move(edge), std::move(fitted),
-          std::move(kept), std::move(rejected_px), is_sharp};
+  return {std::move(ids), std::move(corner_px), std::move(edge), std::move(fitted)};
 }
 
 MergedCornerArrays average_corners(const CellCorners& corners, Index count, const CornerLimits& limits) {
   const auto sums = corner_sums(corners, count, limits.predicted_weight);
   Array<double, 2> xy({count, 2}, NOWHERE);
   Array<double, 1> edge({count}, NOWHERE);
-  Array<bool, 1> unmatched({count});
   for (Index m = 0; m < count; ++m) {
     const double weight = sums(m, WEIGHT);
-    unmatched[m] = 0.0 < weight && weight < FITTED_WEIGHT;
     if (weight > 0.0) {
       xy(m, 0) = sums(m, X) / weight;
       xy(m, 1) = sums(m, Y) / weight;
       edge[m] = sums(m, EDGE) / weight;
     }
   }
-  auto agreeing = update_disagreeing_and_count(corners, edge, xy, limits);
-  auto cells = known_cells(corners, xy);
-  return {std::move(xy), std::move(edge), std::move(agreeing), std::move(cells), std::move(unmatched)};
-}
-
-void update_unmatched_markers(View<double, 2> xy_px, View<const double, 1> edge_px,
-                              View<const bool, 1> agreed, View<const bool, 1> unmatched,
-                              const CellCorners& corners, View<const double, 2> marker_mm,
-                              View<const std::int32_t, 2> table, const CornerLimits& limits) {
-  Array<double, 2> agreed_xy{View<const double, 2>(xy_px)};
-  for (Index m = 0; m < agreed.size(); ++m)
-    if (!agreed[m]) agreed_xy[m].fill(NOWHERE);
-  const auto predicted = localmap::predict_markers(agreed_xy, unmatched, marker_mm, table, limits.prediction);
-  const auto expected = predicted.xy_px.view();
-  for (Index n = 0; n < corners.ids.size(); ++n)
-    for (int k = 0; k < 3; ++k) {
-      const std::int32_t m = corners.ids(n, k);
-      const double variance = predicted.variance_px2[m] * (1.0 + predicted.leverage[m]);
-      const double deviation = limits.max_predicted_deviation * edge_px[m];
-      if (!unmatched[m] || !(variance < deviation * deviation)) continue;
-      const double distance = std::sqrt(squared_distance(point_of(xy_px, m), point_of(expected, m)));
-      const double limit =
-          std::min(limits.max_predicted_distance * edge_px[m], limits.max_distance_ratio * distance);
-      const PlanePoint corner{corners.rejected_px(n, k, 0), corners.rejected_px(n, k, 1)};
-      if (squared_distance(corner, point_of(expected, m)) < limit * limit) {
-        xy_px(m, 0) = corner.x;
-        xy_px(m, 1) = corner.y;
-      }
-    }
+  auto agreeing = count_agreeing(corners, xy, limits);
+  return {std::move(xy), std::move(edge), std::move(agreeing)};
 }
 
 }  // namespace cmp::numbering

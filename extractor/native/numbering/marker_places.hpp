@@ -10,25 +10,11 @@ namespace cmp::numbering {
 
 // Limits of corners; explained in extractor/numbering/marker_places.py.
 struct CornerLimits {
-  double max_corner_misfit, max_corner_spread, max_agreed_spread, min_sharp_share, border_px,
-      predicted_weight;
-  double max_ambiguity_ratio, max_predicted_deviation, max_predicted_distance, max_distance_ratio;
-
-  localmap::NeighbourMapLimits prediction;
+  double max_corner_misfit, max_agreed_spread, predicted_weight;
 
   template <class F>
   static CornerLimits read(const F& f) {
-    return {f["max_corner_misfit"],
-            f["max_corner_spread"],
-            f["max_agreed_spread"],
-            f["min_sharp_share"],
-            f["border_px"],
-            f["predicted_weight"],
-            f["max_ambiguity_ratio"],
-            f["max_predicted_deviation"],
-            f["max_predicted_distance"],
-            f["max_distance_ratio"],
-            f["prediction"]};
+    return {f["max_corner_misfit"], f["max_agreed_spread"], f["predicted_weight"]};
   }
 };
 
@@ -52,42 +38,26 @@ struct CellCorners {
   View<const double, 3> corner_px;  // (C, 3, 2) of the cell's triangle where that is fitted, else predicted
   View<const double, 1> edge_px;    // (C,) the mean predicted edge
   View<const bool, 1> is_fitted;    // (C,) the triangle agrees with the prediction
-  View<const bool, 1> is_kept;      // (C,) the triangle is fitted, or the image's border cuts the cell off
-  View<const double, 3>
-      rejected_px;  // (C, 3, 2) corners of triangles not fitted whose orientation is clear, else NaN
-  bool is_sharp;    // most triangles are fitted
 
   template <class F>
   static CellCorners read(const F& f) {
-    return {f["ids"],     f["corner_px"],   f["edge_px"], f["is_fitted"],
-            f["is_kept"], f["rejected_px"], f["is_sharp"]};
+    return {f["ids"], f["corner_px"], f["edge_px"], f["is_fitted"]};
   }
 };
 
 // The fields of CellCorners.
-using CellCornerArrays = std::tuple<Array<std::int32_t, 2>, Array<double, 3>, Array<double, 1>,
-                                    Array<bool, 1>, Array<bool, 1>, Array<double, 3>, bool>;
-// xy_px (M, 2), edge_px (M,), agreeing (M,), cells (K, 3), is_unmatched (M,) of _MergedCorners.
-using MergedCornerArrays = std::tuple<Array<double, 2>, Array<double, 1>, Array<std::int64_t, 1>,
-                                      Array<std::int32_t, 2>, Array<bool, 1>>;
+using CellCornerArrays =
+    std::tuple<Array<std::int32_t, 2>, Array<double, 3>, Array<double, 1>, Array<bool, 1>>;
+// xy_px (M, 2), edge_px (M,), agreeing (M,) of _MergedCorners.
+using MergedCornerArrays = std::tuple<Array<double, 2>, Array<double, 1>, Array<std::int64_t, 1>>;
 
 // The corners of the cells with a slope.
 //
-// vectors_mm (U, 3, 2) from the layout's centers to the corners; corner_ids (U, 3), their markers; size, the
-// width and height of the image, px.
+// vectors_mm (U, 3, 2) from the layout's centers to the corners; corner_ids (U, 3), their markers.
 CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> vectors_mm,
-                              View<const std::int32_t, 2> corner_ids, std::array<Index, 2> size,
-                              const CornerLimits& limits);
+                              View<const std::int32_t, 2> corner_ids, const CornerLimits& limits);
 
 // The corners merged at each of `count` markers.
 MergedCornerArrays average_corners(const CellCorners& corners, Index count, const CornerLimits& limits);
-
-// Moves unmatched markers (M,) to rejected triangles' corners that the agreed neighbours (M,) predict.
-//
-// xy_px (M, 2) is written; edge_px (M,); marker_mm (M, 2) and table (M, K) of the lattice.
-void update_unmatched_markers(View<double, 2> xy_px, View<const double, 1> edge_px,
-                              View<const bool, 1> agreed, View<const bool, 1> unmatched,
-                              const CellCorners& corners, View<const double, 2> marker_mm,
-                              View<const std::int32_t, 2> table, const CornerLimits& limits);
 
 }  // namespace cmp::numbering

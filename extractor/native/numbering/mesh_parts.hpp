@@ -1,4 +1,4 @@
-// The connected components of the cell mesh, and which of its faces are markers: the start of the numbering.
+// The connected components of the cell mesh, and the faces that are markers: the start of the numbering.
 #pragma once
 
 #include <tuple>

@@ -36,7 +36,7 @@ struct WhiteCellLimits {
   }
 };
 
-// The layout as needed for the search of the white cell.
+// The layout for the search of the white cell.
 struct WhiteCellLayout {
   Index layers;
   View<const std::int32_t, 2> cell_lookup;  // (S, S) of the lattice

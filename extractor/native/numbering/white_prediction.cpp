@@ -73,12 +73,12 @@ class QuadraticFit {
     }
     for (const double weight : View<const double, 1>(weight_)) total_ += weight;
     for (int a = FIRST_CURVATURE; a < TERMS; ++a) normal_(a, a) += limits.ridge * total_;
-    numeric::update_to_cholesky_solution(normal_, right_, TERMS);
+    is_solved_ = numeric::update_to_cholesky_solution(normal_, right_, TERMS);
   }
 
   bool is_determined(double min_pivot_share) const {
     const double pivot = normal_(SLOPE_Y, SLOPE_Y);
-    return pivot * pivot > min_pivot_share * total_;
+    return is_solved_ && pivot * pivot > min_pivot_share * total_;
   }
   // px per mm of image axis 0 or 1 along axis 0 or 1 of the layout
   double slope(int axis, int layout_axis) const { return right_(axis, SLOPE_X + layout_axis) / scale_; }
@@ -124,6 +124,7 @@ class QuadraticFit {
   Array<double, 1> weight_;
   Array<double, 2> normal_{{TERMS, TERMS}, 0.0}, right_{{RIGHT_SIDES, TERMS}, 0.0};
   double total_ = 0.0;
+  bool is_solved_ = false;
 };
 
 }  // namespace

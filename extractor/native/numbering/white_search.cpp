@@ -52,13 +52,6 @@ Array<Index, 1> select_brightest(const PlaceColors& shown, double least_whitenes
   return bright.first(std::min(count, limits.max_white_candidates));
 }
 
-template <class T>
-Array<T, 1> selected(View<const T, 1> values, View<const Index, 1> indices) {
-  Array<T, 1> out({indices.size()});
-  for (Index n = 0; n < indices.size(); ++n) out[n] = values[indices[n]];
-  return out;
-}
-
 Array<std::int32_t, 2> selected(View<const std::int32_t, 2> rows, View<const Index, 1> indices) {
   Array<std::int32_t, 2> out({indices.size(), rows.size(1)});
   for (Index n = 0; n < indices.size(); ++n)
@@ -128,8 +121,6 @@ WhiteCandidates no_candidates() {
           Array<std::int64_t, 1>({0}),
           Array<std::int64_t, 1>({0}),
           Array<double, 2>({0, 2}),
-          Array<double, 1>({0}),
-          Array<double, 1>({0}),
           Array<bool, 1>({0})};
 }
 
@@ -164,8 +155,6 @@ WhiteCandidates search_white_cell(View<const std::uint8_t, 3> image, View<const 
               std::move(found.inside),
               std::move(found.missing),
               std::move(found.middle),
-              selected<double>(shown.brightness, bright),
-              selected<double>(shown.whiteness, bright),
               std::move(found.fits)};
     localmap::update_excluded_places(grid, candidates);
   }

@@ -35,10 +35,9 @@ struct WhiteSearchLimits {
 };
 
 // P bright places, the brightest first: ring, cell (P, N), inside (P,), missing (P,), center_px (P, 2),
-// brightness (P,), whiteness (P,) and fits (P,) of _WhiteCandidates.
-using WhiteCandidates =
-    std::tuple<Index, Array<std::int32_t, 2>, Array<std::int64_t, 1>, Array<std::int64_t, 1>,
-               Array<double, 2>, Array<double, 1>, Array<double, 1>, Array<bool, 1>>;
+// and fits (P,) of _WhiteCandidates.
+using WhiteCandidates = std::tuple<Index, Array<std::int32_t, 2>, Array<std::int64_t, 1>,
+                                   Array<std::int64_t, 1>, Array<double, 2>, Array<bool, 1>>;
 
 // The bright places of the first ring that holds the white cell.
 //

@@ -1,6 +1,7 @@
-// Room "numeric" as Python sees it.
+// Room "numeric" for Python.
 #include "base/binding.hpp"
 
+#include "base/processor.hpp"
 #include "numeric/bilinear.hpp"
 #include "numeric/delaunay.hpp"
 #include "numeric/gaussian.hpp"
@@ -29,9 +30,11 @@ void add_numeric(nb::module_ module) {
   bind<&delaunay>(module, "delaunay", {"points"});
   bind<&fill_patch_mean>(module, "fill_patch_mean", {"flat", "height", "width", "x", "y", "radius", "out"});
   bind<&nearest_points>(module, "nearest_points", {"xy", "queries", "count"});
+  bind<&select>(module, "select", {"values", "place"});
   bind<&median_of>(module, "median_of", {"values", "count"});
   bind<&normal_cdf>(module, "normal_cdf", {"z"});
   bind<&fill_corner_terms>(module, "fill_corner_terms", {"r", "out"});
+  bind<&use_widest_vectors>(module, "use_widest_vectors", {"is_widest"});
   bind<&wedge_correlation>(module, "wedge_correlation", {"squares", "product", "corner"});
 }
 

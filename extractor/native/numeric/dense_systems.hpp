@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 
 #include "base/array.hpp"
 
@@ -12,14 +13,20 @@ inline double dot3(View<const double, 1> a, View<const double, 1> b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// Replaces the rows of `right` (R, n) by the solutions x of gram x = row.
+// Replaces the rows of `right` (R, n) by the solutions x of gram x = row. Where a squared pivot is not above
+// `min_pivot`, false, and the solutions are NaN.
 //
 // gram (n, n), n >= count, symmetric and positive definite; the lower triangle of its first `count` rows is
 // read, and replaced by the Cholesky factor.
-inline void update_to_cholesky_solution(View<double, 2> gram, View<double, 2> right, Index count) {
+inline bool update_to_cholesky_solution(View<double, 2> gram, View<double, 2> right, Index count,
+                                        double min_pivot = 0.0) {
   for (Index j = 0; j < count; ++j) {
     double pivot = gram(j, j);
     for (Index k = 0; k < j; ++k) pivot -= gram(j, k) * gram(j, k);
+    if (!(pivot > min_pivot)) {
+      right.fill(std::numeric_limits<double>::quiet_NaN());
+      return false;
+    }
     pivot = std::sqrt(pivot);
     gram(j, j) = pivot;
     for (Index i = j + 1; i < count; ++i) {
@@ -41,6 +48,7 @@ inline void update_to_cholesky_solution(View<double, 2> gram, View<double, 2> ri
       x[j] = value / gram(j, j);
     }
   }
+  return true;
 }
 
 }  // namespace cmp::numeric

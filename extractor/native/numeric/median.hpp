@@ -26,10 +26,43 @@ inline double median_of(View<const double, 1> values, Index count) {
   return 0.5 * (low + high);
 }
 
-// The number at place k of the sorted numbers, none of them NaN; their order is changed.
+// Moves the numbers from `begin` to `end` for which `is_low` holds to the front; the end of these.
+//
+// Every number is moved, so that no branch depends on the numbers: a processor guesses every second one
+// wrong.
+template <class Condition>
+double* partition_all(double* begin, double* end, Condition is_low) {
+  double* next = begin;
+  for (double* at = begin; at < end; ++at) {
+    const double value = *at;
+    *at = *next;
+    *next = value;
+    next += is_low(value) ? 1 : 0;
+  }
+  return next;
+}
+
+// The number at place k of the sorted numbers, none of them NaN. Their order is changed: no number before
+// place k is larger, none after it is smaller.
 inline double select(View<double, 1> values, Index k) {
-  std::nth_element(values.begin(), values.begin() + k, values.end());
-  return values[k];
+  constexpr Index FEW = 8;        // numbers left for the library
+  constexpr int MAX_ROUNDS = 32;  // of partitions; many rounds are needed by an adverse order only
+  double *begin = values.begin(), *end = values.end(), *const place = values.begin() + k;
+  for (int round = 0; end - begin > FEW && round < MAX_ROUNDS; ++round) {
+    const double first = *begin, middle = begin[(end - begin) / 2], last = end[-1];
+    const double pivot = std::max(std::min(first, middle), std::min(std::max(first, middle), last));
+    double* const not_less = partition_all(begin, end, [pivot](double value) { return value < pivot; });
+    if (place < not_less) {
+      end = not_less;
+    } else if (not_less > begin) {
+      begin = not_less;
+    } else {  // the pivot is the least number
+      begin = partition_all(begin, end, [pivot](double value) { return value <= pivot; });
+      if (place < begin) return pivot;
+    }
+  }
+  std::nth_element(begin, place, end);
+  return *place;
 }
 
 // The median of many numbers, none of them NaN; NaN without any. Their order is changed.

@@ -1,4 +1,4 @@
-// Room "refine" as Python sees it.
+// Room "refine" for Python.
 #include "base/binding.hpp"
 
 #include "refine/drawn_pattern.hpp"

@@ -47,20 +47,20 @@ DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topolog
   const auto xy = state.xy;
   const auto cells = topology.cells, edges = topology.edges, edge_cells = topology.edge_cells;
   const double sigma = state.sigma;
-  const auto& frame = view.frame;
   Array<double, 2> lines = gridlines(xy, state.maps, state.bend, edges, topology.edge_vectors,
                                      state.scatter.share, limits.gridlines);
-  Array<double, 2> sides = gridline_sides(lines, xy, cells, edge_cells, levels, frame);
+  const GridlineSides beside(lines, xy, cells, edge_cells, view.frame);
+  Array<double, 2> sides = beside.light(levels);
   fill_zeros(picture, box);
   draw_cells({xy, cells, topology.cell_edges, edges, lines}, {levels.cell, levels.slope, sigma}, box,
              picture);
   LevelArrays corrected = corrected_levels({view, topology, picture, state}, levels, limits.levels);
-  Array<double, 2> added = gridline_sides(lines, xy, cells, edge_cells, levels_of(corrected), frame);
+  Array<double, 2> added = beside.light(levels_of(corrected));
   update_difference(added, sides, 1.0);
-  add_black(added, lines, levels.black, frame);
+  beside.add_black(added, levels.black);
   const LevelArrays wider = levels_at_blur(levels, xy, cells, topology.cell_color, sigma,
                                            (1.0 + limits.blur_step) * sigma, limits.bleed);
-  Array<double, 2> bleed = gridline_sides(lines, xy, cells, edge_cells, levels_of(wider), frame);
+  Array<double, 2> bleed = beside.light(levels_of(wider));
   update_difference(bleed, sides, limits.blur_step);
   const Array<bool, 1> bending = bending_gridlines(state.roughness, state.bend, edges);
   Array<double, 2> sums =

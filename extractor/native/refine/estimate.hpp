@@ -1,4 +1,4 @@
-// What refinement passes from step to step: the parts that compiled functions take.
+// The values that refinement passes from step to step: the parts that compiled functions take.
 #pragma once
 
 #include "base/array.hpp"
@@ -6,7 +6,7 @@
 
 namespace cmp::refine {
 
-// Where the pattern is thought to be.
+// The estimated places of the pattern.
 struct PatternState {
   View<const double, 2> xy;         // (M, 2) px
   View<const bool, 1> hidden;       // (M,) markers that the image shows little or not at all
@@ -28,7 +28,7 @@ struct PatternState {
 
 // The change of color across the gridlines.
 struct EdgeContrasts {
-  View<const double, 2> sides;      // (E, 6) light on both sides, as gridline_sides gives it
+  View<const double, 2> sides;      // (E, 6) light on both sides, as GridlineSides gives it
   View<const double, 2> contrasts;  // (E, 3) gray levels, differences of the values on both sides
   View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it
 

@@ -25,7 +25,7 @@ ContrastArrays edge_contrasts(View<double, 2> lines, View<const double, 2> xy,
                               const layout::Topology& topology, const InkLevels& levels,
                               const image::PyramidLevel& view, const FirstLookLimits& limits) {
   const auto cells = topology.cells, edge_cells = topology.edge_cells;
-  Array<double, 2> sides = gridline_sides(lines, xy, cells, edge_cells, levels, view.frame);
+  Array<double, 2> sides = GridlineSides(lines, xy, cells, edge_cells, view.frame).light(levels);
   Array<double, 2> contrasts = value_contrasts(sides, view.response.encoded);
   Array<double, 2> clearance = gridline_clearance(lines, contrasts, xy, cells, edge_cells, limits.profiles);
   return {std::move(sides), std::move(contrasts), std::move(clearance)};

@@ -1,4 +1,4 @@
-// The appearance of an image before anything is measured: noise, levels of the inks, contrasts, and blur.
+// The appearance of an image before the first measurement: noise, levels of the inks, contrasts, and blur.
 #pragma once
 
 #include <tuple>

@@ -1,4 +1,4 @@
-// Room "markers" as Python sees it: outliers, recovery, acceptance, and the first look at an image.
+// Room "markers" for Python: outliers, recovery, acceptance, and the first look at an image.
 #include "base/binding.hpp"
 
 #include "refine/acceptance.hpp"

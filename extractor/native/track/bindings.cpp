@@ -1,4 +1,4 @@
-// Room "track" as Python sees it.
+// Room "track" for Python.
 #include "base/binding.hpp"
 
 #include "track/image_check.hpp"

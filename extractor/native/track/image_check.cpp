@@ -103,8 +103,8 @@ bool has_ink_inside_only(const SampledImage& image, const PredictedCell& cell, C
   return true;
 }
 
-// Whether the ink level over black resembles that of cell i a frame ago, more than those of the other inks'
-// cells.
+// Whether the ink level over black resembles that of cell i in the previous frame, more than those of the
+// other inks' cells.
 bool is_same_ink(View<const double, 1> own, Index i, const WarmTables& tables, View<const double, 2> before,
                  const CheckLimits& limits) {
   const double strength = dot3(own, own), smallest = limits.smallest_square;

@@ -37,7 +37,7 @@ using CellCheck =
 
 // The check of the cells with the corners xy (C, 3, 2), NaN where not predicted.
 //
-// image (H, W, 3) BGR; before (C, 3) ink levels over black in the frame before, used if `compare`.
+// image (H, W, 3) BGR; before (C, 3) ink levels over black in the previous frame, used if `compare`.
 CellCheck check_cells(View<const std::uint8_t, 3> image, View<const double, 3> xy, const WarmTables& tables,
                       View<const double, 2> before, bool compare, const CheckLimits& limits);
 

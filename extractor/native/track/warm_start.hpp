@@ -1,4 +1,4 @@
-// The warm start: a frame's numbering is predicted from the frame before, and proved by the image.
+// The warm start: a frame's numbering is predicted from the previous frame, and proved by the image.
 #pragma once
 
 #include <tuple>

@@ -23,8 +23,8 @@ class DetachedLimits(NamedTuple):
     """Limits of the numbering of detached cells.
 
     Attributes:
-        max_rounds: of the numbering outward.
-        min_numbered_cells: intact ones, for any prediction.
+        max_rounds: of the numbering outward. Chosen.
+        min_numbered_cells: intact ones, for any prediction. Measured: rule "claims".
         claims: of the assignments by prediction.
         check: of the consistency across gaps, and of the contacts.
     """
@@ -45,8 +45,9 @@ def number_detached_cells(cells: Cells, numbering: Numbering, lattice: Lattice, 
     around them: the prediction must be certain and near a free cell of the layout with the same ink, and no other cell
     may be assigned there. The nearest cells come first. Cells of one ink are 1.7 cells apart, so a misfit below 0.3 is
     unambiguous. Cells inconsistent across the gap, or across damaged cells that connected the mesh, lose their number.
-    If the white cell touches no cell that was numbered by it, the cells around it must agree in the end; otherwise the
-    numbering is ambiguous. Cells larger than those that just meet, by the factor ``swelling``, are taken at that size.
+    If the white cell touches no cell that was numbered from the white cell, the cells around it must agree at the end;
+    otherwise the numbering is ambiguous. Cells larger than cells that just meet, by the factor ``swelling``, are
+    reduced to that size.
     """
     if np.count_nonzero(numbering.cell >= 0) == len(lattice.ink):
         return numbering

@@ -1,6 +1,6 @@
 """Edge profiles: the colors across each gridline as a profile from 1 to 0, and the blur of that profile.
 
-Profiles are read between the corners of a gridline only (``matched_filter``). They are fast, and safe from a start
+Profiles are read between the corners of a gridline only (``matched_filter``). They are fast, and converge from a start
 that is a pixel off.
 """
 
@@ -15,16 +15,18 @@ class EdgeProfileLimits(NamedTuple):
     """Limits of profiles and of their blur.
 
     Attributes:
-        min_contrast: gray levels; a gridline with less is not read.
-        min_sine: of the angles at a gridline's ends, at least.
-        max_reach: of the cell's height, the reach of a profile to each side.
+        min_contrast: gray levels; a gridline with less is not read. Chosen.
+        min_sine: of the angles at a gridline's ends, at least. Chosen.
+        max_reach: of the cell's height, the reach of a profile to each side. Derived: as in ``MatchedFilterLimits``.
         max_reach_share: of the distance to the next gridline, the reach of a blur profile; 0.41 in a regular cell.
-        middle_share: of the gridline, from its ends to the nearest of the profiles.
-        min_blur_gridlines: clear of other gridlines, below which all gridlines are taken.
-        bilinear_px2: px^2, mean variance that bilinear sampling adds to the blur.
+            Chosen.
+        middle_share: of the gridline, from its ends to the nearest of the profiles. Chosen.
+        min_blur_gridlines: clear of other gridlines, below which all gridlines are taken. Chosen.
+        bilinear_px2: px^2, mean variance that bilinear sampling adds to the blur. Derived: the mean of f (1 - f) over
+            the fractions f of a pixel.
         apparent_blur, true_blur: in units of the cell's height, one for the other. Wide blur mixes the neighbours' inks
             into the middles that the contrasts are taken from, which makes profiles look too steep (rendered
-            honeycombs). The native code has room for as many.
+            honeycombs). The native code has room for as many. Measured on these, by no command that is kept.
     """
 
     min_contrast: float = 12.0

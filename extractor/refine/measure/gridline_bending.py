@@ -7,7 +7,8 @@ gridlines, which are 0 where the map is quadratic. A gridline then deviates from
     t (1 - t) (b + s (1 - 2 t)),
 
 t along the chord, b and s of zero mean and a deviation that is a share of these differences. The share, from
-``min_bend_share`` to ``max_bend_share``, follows from the gridlines around: how much more they are bent than noise
+``min_bend_share`` to ``max_bend_share``, follows from the surrounding gridlines: their bending above the part that
+    noise
 explains. Both unknowns are eliminated from a gridline's sums before the markers are solved, and computed afterwards.
 """
 
@@ -19,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import measure as native
-from extractor.refine.measure.marker_scatter import BEND_BY_SCATTER
 from extractor.refine.synthesis.pixel_rows import LIMITS as PIXEL_LIMITS
 
 
@@ -28,22 +28,25 @@ class BendingLimits(NamedTuple):
 
     Attributes:
         min_bend_share, max_bend_share: b and s over the differences around them (RMS) where these are smooth, and at
-            most; from the surfaces under balls that press, shear and twist.
+            most; from the surfaces under balls that press, shear and twist. Measured on these, by no command that is
+            kept.
         bend_to_end_shift: the shift of a gridline's ends that remains, in deviations of b and s; from these surfaces.
-        max_bend_deviation: in units of the gridline's length.
+            Measured on them, likewise.
+        max_bend_deviation: in units of the gridline's length. Chosen.
         third_difference_noise: the noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some
-            allowance for its scatter.
-        mean_over_median: a mean of squares against their median.
-        misfit_tolerance: five deviations of the shift of the ends, squared,
-        max_misfit_tolerance: and at most, in units of the blur, squared.
-        min_significance: deviations by which bending must exceed its noise.
-        max_bend: b and s, in units of the gridline's length.
-        bend_by_scatter: the least variance of b and s over that of the markers' scatter.
+            allowance for its scatter. Derived: twice 20, times an allowance of 2, which is chosen.
+        mean_over_median: a mean of squares against their median. Chosen near the 2.2 of the square of a normal
+            variable.
+        misfit_tolerance: five deviations of the shift of the ends, squared. Chosen.
+        max_misfit_tolerance: the most of that, in units of the blur, squared. Chosen.
+        min_significance: deviations by which bending must exceed its noise. Chosen.
+        max_bend: b and s, in units of the gridline's length. Chosen.
         min_determinant_share: of the product of the sums at both ends; a gridline whose determinant is smaller does not
-            show bending.
+            show bending. Chosen.
         min_information_share: of the information about b with both ends held; a gridline with less does not show
-            bending.
-        band: in units of the blur, the distance from a gridline within which pixels count.
+            bending. Chosen.
+        band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
+            ``PixelRowLimits``.
     """
 
     min_bend_share: float = 0.01
@@ -56,7 +59,6 @@ class BendingLimits(NamedTuple):
     max_misfit_tolerance: float = 0.1
     min_significance: float = 3.0
     max_bend: float = 0.3
-    bend_by_scatter: float = BEND_BY_SCATTER
     min_determinant_share: float = 1e-6
     min_information_share: float = 1e-3
     band: float = PIXEL_LIMITS.band
@@ -70,7 +72,7 @@ class MarkerRows(NamedTuple):
 
     Attributes:
         edges: (E, 2) marker ids of the two in the middle.
-        next_markers: (E, 2) marker ids of the one before and the one after, -1 for none.
+        next_markers: (E, 2) marker ids of the marker before and the marker after, -1 for none.
         third_differences: (E, 2) the layout's own third difference of the four, in units of its mean edge.
     """
 
@@ -90,8 +92,8 @@ def measure_roughness(
     """The roughness of the markers.
 
     The roughness is the median of the squared third differences along the gridlines at a marker and at its neighbours,
-    less the part that noise and the layout itself explain. By the median, one marker that dirt has moved does not free
-    its gridlines to follow.
+    less the part that noise and the layout itself explain. With the median, one marker that dirt has moved does not let
+    its gridlines bend.
 
     Args:
         xy: (M, 2) px, the markers, NaN where unknown.

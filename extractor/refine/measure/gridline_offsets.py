@@ -1,4 +1,4 @@
-"""Offsets of the gridlines at virtual markers, measured where refinement last compared the image with the pattern."""
+"""Offsets of the gridlines at virtual markers, measured at the last comparison of the image with the pattern."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ class OffsetLimits(NamedTuple):
     """Limits of the offsets.
 
     Attributes:
-        clear_sigma: in units of the blur, the least distance of the next gridline where nothing was drawn.
-        min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast.
-        min_offset_weight: of a gridline, for its offsets to be measured.
-        band: in units of the blur, the distance from a gridline within which pixels count.
+        clear_sigma: in units of the blur, the least distance of the next gridline where nothing was drawn. Chosen.
+        min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast. Chosen.
+        min_offset_weight: of a gridline, for its offsets to be measured. Chosen.
+        band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
+            ``PixelRowLimits``.
     """
 
     clear_sigma: float = 2.0
@@ -34,13 +35,13 @@ LIMITS = OffsetLimits()
 
 
 class GridlineReading(NamedTuple):
-    """The gridlines and the levels beside them, where refinement last compared the image with the pattern.
+    """The gridlines and the levels beside them, at the last comparison of the image with the pattern.
 
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
-        sides: (E, 6), the light on both sides, as ``gridline_sides`` gives it.
-        added: (E, 6), the light to add to the drawing on both sides; the sides themselves where nothing was drawn.
-        clearance: (E, 4), as ``gridline_clearance`` gives it; used where nothing was drawn.
+        sides: (E, 6), the light on both sides, as ``GridlineSides`` gives it.
+        added: (E, 6), the light to add to the drawing on both sides; the sides themselves where no pattern was drawn.
+        clearance: (E, 4), from ``gridline_clearance``; used where no pattern was drawn.
         weight: (E,) 0 to 1.
         variance_ratio: (E,), as ``variance_ratios`` gives it.
         dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
@@ -64,7 +65,7 @@ class GridlineReading(NamedTuple):
 def measure_virtual_markers(
     view: PyramidLevel, model: NDArray[np.float32], reading: GridlineReading, count: int
 ) -> NDArray[np.float64]:
-    """The virtual markers as the image shows them.
+    """The virtual markers measured in the image.
 
     Args:
         view: the image.

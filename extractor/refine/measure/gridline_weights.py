@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from extractor._native import measure as native
 
-SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge
+SHORTEST_RARITY = 100  # one in so many gridlines is shorter than a short edge; chosen
 MIN_NOISE = 0.3  # gray levels; rounding alone makes 0.29
 MIN_SIGMA_PX = 0.4  # blur with the pixel; the bare pixel has 0.29
 
@@ -18,23 +18,23 @@ class GridlineWeightLimits(NamedTuple):
     """Limits of the gridlines' weights, of the noise and of a step.
 
     Attributes:
-        min_noise: gray levels.
-        prior_hidden_px: prior deviation of a hidden marker from its prediction.
+        min_noise: gray levels. Derived: rounding alone makes 0.29.
+        prior_hidden_px: prior deviation of a hidden marker from its prediction. Chosen.
         informed_factor: of the prior information about a hidden marker; markers with more count for the median
-            information.
-        min_information_share: of that median; a marker with less does not guide its neighbours' gridlines.
+            information. Chosen.
+        min_information_share: of that median; a marker with less does not guide its neighbours' gridlines. Chosen.
         rim_deviation_px: at the rim, a marker with enough weight and a smaller deviation guides them all the same: the
-            map of markers on one side only is less precise.
-        min_clean_share: of the gridlines with weight 1, from which on the noise is that of all gridlines.
-        min_marker_weight: mean weight of the gridlines at a marker, for the marker to count.
-        min_sigma_px: of the blur.
-        max_blur_change: of the blur, in one step.
+            map of markers on one side only is less precise. Chosen.
+        min_clean_share: of the gridlines with weight 1, from which on the noise is that of all gridlines. Chosen.
+        min_marker_weight: mean weight of the gridlines at a marker, for the marker to count. Chosen.
+        min_sigma_px: of the blur. Derived: the bare pixel has 0.29.
+        max_blur_change: of the blur, in one step. Chosen.
         chance_factor, chance_deviations: of the median misfit, and deviations above it; a misfit up to their sum is
-            explained by chance.
-        min_misfit: gray levels^2; the least misfit by which is divided.
+            explained by chance. Chosen.
+        min_misfit: gray levels^2; the least misfit by which is divided. Derived: it only keeps a division from failing.
         min_determinant_share, min_determinant: of the squared sum over both ends, and of a gridline without any; the
-            least determinant of a gridline's ends by which is divided.
-        min_edge_px: of the median length of the edges.
+            least determinant of a gridline's ends by which is divided. Derived: it only keeps a division from failing.
+        min_edge_px: of the median length of the edges. Chosen.
     """
 
     min_noise: float = MIN_NOISE
@@ -60,7 +60,7 @@ LIMITS = GridlineWeightLimits()
 def short_edges(
     xy: NDArray[np.float64], edges: NDArray[np.int32], rarity: int, other_rarity: int
 ) -> tuple[float, float]:
-    """Two lengths, px, that all edges exceed but for one in ``rarity``, and but for one in ``other_rarity``.
+    """Two lengths, px, that all edges exceed except for one in ``rarity``, and except for one in ``other_rarity``.
 
     Args:
         xy: (M, 2) px, NaN where unknown.

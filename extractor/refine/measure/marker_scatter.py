@@ -1,17 +1,17 @@
-"""Scatter of the markers: how far each lies by itself off the smooth map that all of them define.
+"""Scatter of the markers: their independent deviations from the smooth map that all markers define.
 
-Castings scatter. Where a marker lies off by itself, the sides of its cells stay straight, and the tangents of a map
-through such markers are wrong by as much as the markers scatter. The differences of markers along their gridlines tell
-scatter from bending. Independent scatter of variance v per axis gives third differences (1, 3, 3, 1) a variance of
-20 v, and fourth ones (1, 4, 6, 4, 1) of 70 v. Where a map bends, its fourth differences are smaller against its third
-ones. With r the largest ratio of both variances there,
+The markers of castings scatter. Where a marker deviates independently, the sides of its cells are straight, and the
+tangents of a map through such markers are wrong by as much as the markers scatter. The differences of markers along
+their gridlines distinguish scatter from bending. Independent scatter of variance v per axis gives third differences (1,
+3, 3, 1) a variance of 20 v, and fourth ones (1, 4, 6, 4, 1) of 70 v. Where a map bends, its fourth differences are
+smaller against its third ones. With r the largest ratio of both variances there,
 
     v = (fourth - r third) / (70 - 20 r) - noise,
 
-where both variances are by the lower quartile of all gridlines of the picture: rims, slips and dirt do not count. The
-share of v in the fourth differences, 70 v / fourth (by their median), is how far the prior of a gridline's shape goes
-from the tangents of the map to its second derivatives, whose error by scatter is a fifth of that of the tangents. That
-error is the least variance of the gridline's bending.
+where both variances are computed from the lower quartile of all gridlines of the picture, so that rims, slips and dirt
+have no influence. The share of v in the fourth differences, 70 v / fourth (by their median), is the weight of the map's
+second derivatives over its tangents in the prior of a gridline's shape; the error of second derivatives by scatter is a
+fifth of the error of tangents. This error is the smallest variance of the gridline's bending.
 """
 
 from __future__ import annotations
@@ -23,11 +23,6 @@ from numpy.typing import NDArray
 
 from extractor._native import measure as native
 from extractor.layout.topology import Topology
-
-# The variance of b (see ``gridline_bending``) of the cubics with second derivatives of the map, over that of the
-# scatter: the mean over the gridlines of patterns of 11 layers (397 markers), by Monte Carlo. It is 0.056 where
-# both rings of both ends are complete, and 0.36 along the rim.
-BEND_BY_SCATTER = 0.14
 
 
 class MarkerScatter(NamedTuple):
@@ -53,18 +48,18 @@ class ScatterLimits(NamedTuple):
     """Limits of the scatter.
 
     Attributes:
-        smooth_ratio: variance of fourth differences over that of third ones, at most, where nothing scatters. On bulges
+        smooth_ratio: variance of fourth differences over that of third differences, at most, without scatter. On bulges
             and twists of the suite "plain" it is 0.14 to 0.41 (`python -m benchmarks.calibration --suite plain`). With
             0.3, dents and balls on patterns of 4 and 6 layers (`tests/extractor/refine/test_bending.py`) were taken for
-            scatter; with 1.5 hardly any are, and their errors do not rise.
+            scatter; with 1.5 hardly any are, and their errors do not rise. Measured by both.
         noise_allowance: stated variances of a marker that are noise, not scatter. On the flat patterns of that suite
             fourth differences ask for 1.0 to 1.5, in steep views for 7 after the first step; a scatter of 0.05 px makes
-            40 to 60.
+            40 to 60. Measured: rule "scatter".
         start_allowance: the same before the first step by synthesis, where markers are as profiles left them: dirt of
-            the suite "damage" asks for up to 61 there.
+            the suite "damage" asks for up to 61 there. Measured: rule "scatter of profiles".
         quantile: of the squared differences, by which their variance is measured: scatter is everywhere, and rims,
             slips and dirt are somewhere. By the median, a slip of a tenth of an edge on a pattern of 4 layers was taken
-            for scatter, and its errors rose by a half.
+            for scatter, and its errors rose by a half. Measured: rule "scatter".
     """
 
     smooth_ratio: float = 1.5
@@ -91,7 +86,7 @@ def measure_scatter(
         maps: (M, 2, 5), as ``local_maps`` gives them.
         diagonal: (M, 3) 1/px^2, the information's diagonal blocks.
         topology: of the layout.
-        by_synthesis: whether a step by synthesis has placed the markers; else profiles have.
+        by_synthesis: the markers were placed by a step by synthesis; else by profiles.
     """
     found = native.measure_scatter(xy, maps, diagonal, topology, by_synthesis, LIMITS)
     return MarkerScatter(*found)

@@ -1,4 +1,4 @@
-"""The error that the last step by synthesis leaves."""
+"""The remaining error after the last step by synthesis."""
 
 from __future__ import annotations
 
@@ -11,21 +11,25 @@ from numpy.typing import NDArray
 from extractor._native import solve as native
 from extractor.refine.solve.fisher_information import Information
 
-# Where blur is wide a step leaves as much of a usual one as the square of blur over edge, times
+# With wide blur, the remaining share of a usual step is the square of blur over edge, times
 WIDE_BLUR_REMAINDER = 20.0
 
 
 class ConvergenceLimits(NamedTuple):
-    """Limits of the error that the last step leaves.
+    """Limits of the remaining error after the last step.
 
     Attributes:
-        remaining_share: of a step, per blur, that another step would still correct.
-        max_remaining_share: of a step, at most.
-        mean_over_median: of squares, by which the median of the squared shifts becomes their mean.
+        remaining_share: of a step, per blur, that another step would still correct. Chosen.
+        max_remaining_share: of a step, at most. Chosen.
+        max_shrinking: of a marker's last step over the step before, at most; the following steps would shrink by the
+            same factor. Chosen.
+        mean_over_median: of squares, by which the median of the squared shifts becomes their mean. Derived: 1 / ln 2,
+            of the sum of two normal squares.
     """
 
     remaining_share: float = 1.0
     max_remaining_share: float = 0.5
+    max_shrinking: float = 0.9
     mean_over_median: float = 1.44
 
 
@@ -52,19 +56,23 @@ def typical_move(shift: NDArray[np.float64], information: Information) -> float:
 
 
 def convergence_covariance(
-    shift: NDArray[np.float64], sigma: float, remaining_share: float
+    shift: NDArray[np.float64], last: NDArray[np.float64], sigma: float, remaining_share: float
 ) -> NDArray[np.float64]:
-    """The covariance of the error that the last step left.
+    """The covariance of the remaining error after the last step.
 
-    The drawing responds less than linearly to shifts of the size of the blur.
+    The drawing responds less than linearly to shifts of the size of the blur. A marker whose steps shrink slowly is as
+    far from its place as the steps that would follow (a geometric series).
 
     Args:
         shift: (M, 2) px, the last step.
+        last: (M, 2) px, the step before, NaN where there was none.
         sigma: the blur, px.
-        remaining_share: share of a usual step that is left in any case.
+        remaining_share: share of a usual step that always remains.
 
     Returns:
         (M, 2, 2) px^2.
     """
-    covariance: NDArray[np.float64] = native.convergence_covariance(shift, sigma, remaining_share, LIMITS)
+    covariance: NDArray[np.float64] = native.convergence_covariance(
+        shift, last, sigma, remaining_share, LIMITS
+    )
     return covariance

@@ -1,9 +1,9 @@
 """The disagreement of the gridlines that meet at markers, and the variance that it shows.
 
 A marker has two unknowns and up to six gridlines. Where noise alone moves gridlines, the squared distances between each
-gridline's own place and the place that the solved markers give it add up to the degrees of freedom. Halos, clipping,
-ink edges that lie beside each other, dirt and compression make them larger. The ratio, of the picture and of the
-gridlines around each, multiplies the variance of the noise (the Birge ratio; Birge, Phys. Rev. 40, 207, 1932).
+gridline's own place and its place by the solved markers add up to the degrees of freedom. Halos, clipping,
+displaced ink edges, dirt and compression increase these distances. The ratio, of the picture and of the
+gridlines around each marker, multiplies the variance of the noise (the Birge ratio; Birge, Phys. Rev. 40, 207, 1932).
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ class DisagreementLimits(NamedTuple):
     """Limits of the variance that the disagreement shows.
 
     Attributes:
-        tail_freedom: degrees of freedom of the t distribution by which gridlines count for their picture.
+        tail_freedom: degrees of freedom of the t distribution by which gridlines count for their picture. Chosen;
+            `python -m benchmarks.calibration` judges it.
         picture_freedom: degrees of freedom by which the picture's ratio counts beside that of the gridlines around.
-        rounds: of the picture's ratio.
-        min_freedom: degrees of freedom of a gridline, at least.
-        max_square: of a distance over its deviation, at most.
-        min_ratio: of variances, at least.
-        min_determinant: of a gridline's two ends, relative to the product of their sums; with less the two ends are
-            not told apart, and the gridline does not count.
+            Chosen; `python -m benchmarks.calibration` judges it.
+        rounds: of the picture's ratio. Chosen.
+        min_freedom: degrees of freedom of a gridline, at least. Derived: it only keeps a division from failing.
+        max_square: of a distance over its deviation, at most. Derived: it only keeps a division from failing.
+        min_ratio: of variances, at least. Derived: it only keeps a division from failing.
+        min_determinant: of a gridline's two ends, relative to the product of their sums; with less the two ends are not
+            told apart, and the gridline does not count. Chosen.
         min_block_determinant: squared gray levels per px^2, squared; the least determinant of a marker's block by which
-            is divided.
+            is divided. Derived: it only keeps a division from failing.
     """
 
     tail_freedom: float = 6.0

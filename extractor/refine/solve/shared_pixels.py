@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-MIN_ANGLE = 0.4  # rad; the closed forms hold for long gridlines, which two at a smaller angle are not
+MIN_ANGLE = 0.4  # rad; the closed forms hold for long gridlines, which two at a smaller angle are not. Chosen
 DEGREE = 8  # of the polynomials; the native code has room for as many coefficients
 
 
@@ -38,11 +38,11 @@ class SharedPixelLimits(NamedTuple):
     """Limits of shared pixels, and the closed forms between them.
 
     Attributes:
-        max_cosine: of the angle between two gridlines, as which a smaller angle counts; derived from ``MIN_ANGLE``.
-        min_end_information: least share of a gridline's information that is left where its ends are blurred.
+        max_cosine: of the angle between two gridlines, as which a smaller angle counts. Derived from ``MIN_ANGLE``.
+        min_end_information: least share of a gridline's information that is left where its ends are blurred. Chosen.
         min_uncut_information: squared gray levels per px^2; the least information of a whole gridline by which is
-            divided.
-        plain_form, linear_form: coefficients of r a and of r^3 b; derived by ``_closed_forms``.
+            divided. Derived: it only keeps a division from failing.
+        plain_form, linear_form: coefficients of r a and of r^3 b. Derived by ``_closed_forms``.
     """
 
     max_cosine: float = float(np.cos(MIN_ANGLE))

@@ -20,7 +20,7 @@ class BleedLimits(NamedTuple):
     """Limits of bleed.
 
     Attributes:
-        max_bleed: share of a neighbour in a cell's mean, the most that is corrected.
+        max_bleed: share of a neighbour in a cell's mean, the most that is corrected. Chosen.
         disc: limits of the disc in a cell's middle.
     """
 
@@ -52,10 +52,10 @@ def levels_at_blur(
     drawn_sigma: float,
     sigma: float,
 ) -> InkLevels:
-    """The levels that the cells' middles show with the blur ``sigma`` instead of ``drawn_sigma``, px.
+    """The levels in the cells' middles with the blur ``sigma`` instead of ``drawn_sigma``, px.
 
     Args:
-        levels: that they show with ``drawn_sigma``.
+        levels: levels with ``drawn_sigma``.
         xy: (M, 2) px, the markers.
         cells, color: as ``cells`` and ``cell_color`` in ``Topology``.
     """

@@ -1,7 +1,7 @@
-"""Dot gain: all cells look larger than they are, by the same width, as inks run out or the camera is not linear.
+"""Dot gain: all cells look larger by the same width, because inks bleed or the camera is not linear.
 
-Every gridline then lies off towards the black beside the gridline. Around a marker where colored and black cells
-alternate this cancels. At the pattern's rim it does not: an acute corner there moves outward by several widths.
+Every gridline is then shifted towards the black beside the gridline. Around a marker where colored and black cells
+alternate, these shifts cancel. At the pattern's rim they do not: an acute corner there moves outward by several widths.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ class DotGainLimits(NamedTuple):
 
     Attributes:
         min_gridlines, max_gridlines: gridlines that the dot gain is measured from; with no more than the least, it is
-            taken as 0, and of more than the most, every n-th is used.
-        min_dot_gain: in units of the blur; drawings, compression and glare look like less, which is taken as 0.
-        min_sine: of the angle of a corner; a sharper corner moves no farther.
+            taken as 0, and of more than the most, every n-th is used. Chosen.
+        min_dot_gain: in units of the blur; drawings, compression and glare look like less, which is taken as 0. Chosen.
+        min_sine: of the angle of a corner; a sharper corner moves no farther. Chosen.
     """
 
     min_gridlines: int = 40

@@ -2,10 +2,10 @@
 
 Gridlines are straight in the layout; the map to the image curves them. The map's derivative at every marker is
 estimated from the two rings of neighbours, and gives the direction of each gridline at that marker. The gridline is the
-cubic between two markers with these directions, as a C1-smooth interpolation of the map (Clough-Tocher) has it.
+cubic between two markers with these directions, as in a C1-smooth interpolation of the map (Clough-Tocher).
 
-Where markers scatter, each by itself, the directions are wrong, and the sides of cells stay straight. There a gridline
-curves as the map's second derivatives say (``marker_scatter``).
+Where markers scatter independently, the directions are wrong, and the sides of cells are straight. There a gridline
+curves by the map's second derivatives (``marker_scatter``).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class GridlineLimits(NamedTuple):
     """Limits of gridlines.
 
     Attributes:
-        max_slope: of a gridline against its chord; a larger slope is an error of the map.
-        min_length_px: px, of the chord; no shorter gridline is known.
+        max_slope: of a gridline against its chord; a larger slope is an error of the map. Chosen.
+        min_length_px: px, of the chord; no shorter gridline is known. Chosen.
         maps: limits of the maps where a ring is incomplete.
     """
 
@@ -72,7 +72,7 @@ def gridlines(
         xy: (M, 2) px, the markers. maps: (M, 2, 5), as ``local_maps`` gives them.
         bend: (E, 2) px, b and s of ``gridline_bending``, which add to the slopes.
         edges: (E, 2) marker ids. along: (E, 2) ``Topology.edge_vectors``.
-        scatter_share: 0 to 1, how far slopes go from those of the maps' tangents to those of the cubic that has the
+        scatter_share: 0 to 1, weight of the slopes of the cubic over those of the maps' tangents; the cubic has the
             maps' second derivatives at both ends.
 
     Returns:

@@ -1,9 +1,9 @@
 """The ink levels of one image: a level for every cell, from the cell itself and from all cells of its ink.
 
 A cell's own level is noisy, and half of the error would go into its gridlines. Light and print vary smoothly from cell
-to cell as a rule, and a low polynomial over the image, fitted robustly to each ink, is far less noisy. Every level is
-drawn towards the polynomial in the proportion of noise in the cells' scatter about the polynomial. Where the scatter is
-not noise (uneven print, hard shadows, a missing cell) the cell's own level stays.
+to cell in most images, and a low polynomial over the image, fitted robustly to each ink, has much less noise. Every
+level is moved towards the polynomial by the share of noise in the cells' scatter about the polynomial. Where the
+scatter is not noise (uneven print, hard shadows, a missing cell) the cell's own level is kept.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class DiscLimits(NamedTuple):
     """Limits of the disc in a cell's middle, whose mean is the cell's level.
 
     Attributes:
-        disc_share: of the inscribed circle's radius, the disc of a cell's level at most.
-        first_disc_share: the same where nothing is drawn yet, and the neighbours' ink bleeds into the disc.
-        clear_sigma: in units of the blur, the distance of the disc from the cell's sides.
-        min_radius_px: px, of the disc.
+        disc_share: of the inscribed circle's radius, the disc of a cell's level at most. Chosen.
+        first_disc_share: the same where nothing is drawn yet, and the neighbours' ink bleeds into the disc. Chosen.
+        clear_sigma: in units of the blur, the distance of the disc from the cell's sides. Chosen.
+        min_radius_px: px, of the disc. Chosen.
     """
 
     disc_share: float = 0.55
@@ -38,7 +38,8 @@ class InkLevelLimits(NamedTuple):
     """Limits of ink levels.
 
     Attributes:
-        cells_for_terms: from so many cells on, so many terms of an ink's polynomial.
+        cells_for_terms: from so many cells on, so many terms of an ink's polynomial. Derived: polynomials of degree 3,
+            2, 1 and 0 have so many; the cells are chosen.
         disc: of the disc in a cell's middle.
         polynomial: of the robust fit.
     """

@@ -9,14 +9,14 @@ class PolynomialLimits(NamedTuple):
     """Limits of a robust fit.
 
     Attributes:
-        outlier_tolerance: deviations of the scatter, beyond which a cell is an outlier.
-        min_outlier_misfit: gray levels^2, added to that tolerance.
-        max_fit_rounds: rounds of weighting.
-        falling_variance: rounds end when the scatter falls to no less than this share.
-        saturation_per_px: 1/px; a cell of n pixels weighs n / (1 + saturation_per_px n) before the first round.
-        weight_reach: in units of the scatter, the misfit where a cell's weight is a quarter.
-        expected_factor: of the variance expected from noise, the part that is no scatter of the cells.
-        ridge: added to the diagonal of the normal equations, in units of the cells' total weight.
+        outlier_tolerance: deviations of the scatter, beyond which a cell is an outlier. Chosen.
+        min_outlier_misfit: gray levels^2, added to that tolerance. Chosen.
+        max_fit_rounds: rounds of weighting. Chosen.
+        falling_variance: rounds end when the scatter falls to no less than this share. Chosen.
+        saturation_per_px: 1/px; a cell of n pixels weighs n / (1 + saturation_per_px n) before the first round. Chosen.
+        weight_reach: in units of the scatter, the misfit where a cell's weight is a quarter. Chosen.
+        expected_factor: of the variance expected from noise, the part that is no scatter of the cells. Chosen.
+        ridge: added to the diagonal of the normal equations, in units of the cells' total weight. Chosen.
     """
 
     outlier_tolerance: float = 4.0

@@ -10,7 +10,7 @@ class PixelRowLimits(NamedTuple):
 
     Attributes:
         band: in units of the blur, the distance from a gridline within which pixels count. The polynomials of
-            ``pixel_weights.hpp`` hold up to 0.4 more.
+            ``pixel_weights.hpp`` hold up to 0.4 more. Derived: erf(2.2), 99.8 % of what a gridline tells, lies within.
     """
 
     band: float = 2.2

@@ -1,4 +1,4 @@
-"""What a contact takes: objects' shapes, height maps from files, the table of a scene, and values that cannot be."""
+"""The input of a contact: shapes of objects, height maps from files, the table of a scene, and impossible values."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_no_press_is_no_contact(friction: float) -> None:
 def test_object_that_misses_by_its_height() -> None:
     """Above the solved area there is only the ball's upper flank."""
     found = solve(LAYER, Ball(12.0, centre_mm=(17.0, 0.0)), Motion(0.1), **SMALL)
-    assert not found.in_contact.any() and "touches nothing in the solved area" in found.warnings[0]
+    assert not found.in_contact.any() and "does not touch the solved area" in found.warnings[0]
 
 
 def test_lifting_off_leaves_nothing() -> None:

@@ -61,7 +61,7 @@ def test_what_varies_has_a_column() -> None:
     ("value", "said"),
     [
         ({"uniform": [2, 1]}, "uniform is [2, 1]; it must be [low, high] with low <= high"),
-        ({"uniform": [1, 2], "normal": [0, 1]}, "normal has no place beside uniform"),
+        ({"uniform": [1, 2], "normal": [0, 1]}, "normal is not allowed with uniform"),
         ({"log_uniform": [0, 1]}, "0 < low <= high"),
         ({"normal": [0, -1]}, "the deviation 0 or more"),
         ({"whole": [0.5, 2]}, "whole numbers"),
@@ -71,7 +71,7 @@ def test_what_varies_has_a_column() -> None:
         ({"repeat": {"uniform": [0, 2]}, "of": 1}, "a whole number from 0 to 1000"),
         ({"repeat": 2}, "repeat needs of"),
         ({"chance": 1.5, "of": 1}, "chance is 1.5; it must be a number from 0 to 1"),
-        ([{"chance": 0.5, "of": 1}], "chance has no place in a list"),
+        ([{"chance": 0.5, "of": 1}], "chance is not allowed in a list"),
         ({"repeat": 1, "of": {"x": {"uniform": ["a", 2]}}}, "uniform is ['a', 2]"),
     ],
 )

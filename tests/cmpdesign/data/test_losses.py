@@ -47,7 +47,7 @@ def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def started(*command: object) -> Iterator[subprocess.Popen[str]]:
-    """A program in a session of its own; what is left of it is killed at the end."""
+    """A program in a separate session; its remaining processes are killed at the end."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
         [sys.executable, *map(str, command)], cwd=ROOT, env=environment, text=True, start_new_session=True,
@@ -175,7 +175,7 @@ def test_without_its_scheduler_a_run_ends_and_another_goes_on(serial: Path, tmp_
             os.killpg(process.pid, signal.SIGKILL)
             code, printed, errors = finish(run)
         assert (code, printed) == (2, "")
-        assert len(errors.splitlines()) == 1 and f"the scheduler at {address} went away" in errors
+        assert len(errors.splitlines()) == 1 and f"the scheduler at {address} was lost" in errors
         with started(*dataset(serial, out, "--scheduler", f"dask={address}")) as run:
             code, printed, errors = finish(run)
         assert code == 2 and "no dask scheduler answers at" in errors and len(errors.splitlines()) == 1
@@ -185,7 +185,7 @@ def test_without_its_scheduler_a_run_ends_and_another_goes_on(serial: Path, tmp_
 
 
 def can_mount() -> bool:
-    """Whether this user may mount a small file system of its own."""
+    """Whether this user may mount a small file system."""
     if shutil.which("unshare") is None:
         return False
     mount = "mount -t tmpfs -o size=1m none /mnt"
@@ -219,7 +219,7 @@ def test_a_full_disk_ends_a_run_and_room_lets_it_go_on(serial: Path, tmp_path: P
     assert (
         len(errors) == 1
         and "No space left on device" in errors[0]
-        and "the same command goes on" in errors[0]
+        and "the same command makes the other shards" in errors[0]
     )
     assert 0 < int(result.stdout.splitlines()[0]) < SHARDS
     assert contents(saved) == contents(serial / "made")

@@ -19,7 +19,7 @@ SQUARE = 'pattern = "square"\nlayers = 3\npitch_mm = 2.0\n'
     [
         ("frames = 4", "frames = 5", "frames is 5; it must be a multiple of frames_a_shard, 2, as in 6"),
         ("frames = 4", "frame = 4", "frame is unknown (did you mean frames?)"),
-        ('["small.toml"]', '["small.toml", "small.toml"]', "designs has two of the name small"),
+        ('["small.toml"]', '["small.toml", "small.toml"]', "designs has two designs of the name small"),
         ('["small.toml"]', '["smal.toml"]', "smal.toml: no such file"),
         ('["small.toml"]', '["square.toml"]', "the design square has no triangles"),
         ('["small.toml"]', '["small.toml"]\nweights = [1, 2]', "designs: weights is [1.0, 2.0]"),
@@ -27,7 +27,7 @@ SQUARE = 'pattern = "square"\nlayers = 3\npitch_mm = 2.0\n'
         ("noise = {", "nose = {", "[sensor] nose is unknown (did you mean noise?)"),
         ("noise = {whole = [1, 2]}", "noise = {uniform = [0, 256]}", "it must lie between 0 and 255"),
         ("noise = {whole = [1, 2]}", "noise = {uniform = [2, 1]}", "scene.sensor.noise: uniform is [2, 1]"),
-        ("size_px", "seed = 3\nsize_px", "scene.seed has no place in a plan"),
+        ("size_px", "seed = 3\nsize_px", "scene.seed is not allowed in a plan"),
         ('kind = "cube"', 'kind = "cub"', "contact.indenter.kind is 'cub' (did you mean cube?)"),
     ],
 )
@@ -45,7 +45,7 @@ def test_a_wrong_plan_is_one_line(tmp_path: Path, old: str, new: str, said: str)
 def test_jpeg_in_the_sensor_and_of_the_file_is_one_too_many(tmp_path: Path) -> None:
     plan = write_plan(tmp_path, kind="jpeg")
     plan.write_text(plan.read_text().replace("noise = {", "jpeg_quality = 90\nnoise = {"), encoding="utf-8")
-    assert "scene.sensor.jpeg_quality has no place beside" in refused("dataset", plan, "-o", tmp_path / "out")
+    assert "scene.sensor.jpeg_quality is not allowed with" in refused("dataset", plan, "-o", tmp_path / "out")
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_jpeg_in_the_sensor_and_of_the_file_is_one_too_many(tmp_path: Path) -> N
         (("--shards", "3:2"), "A below B"),
         (("--shards", "3"), "the plan has 2 shards"),
         (("--scheduler", "slurm"), "it must be local or dask=ADDRESS"),
-        (("--scheduler", "dask=a:1", "--workers", "2"), "workers has no place beside a dask scheduler"),
+        (("--scheduler", "dask=a:1", "--workers", "2"), "workers is not allowed with a dask scheduler"),
         (("--scheduler", "dask=missing.json"), "missing.json: no such scheduler file"),
         (("--workers", "1000"), "it must be from 1 to 512"),
     ],

@@ -1,4 +1,4 @@
-"""Designs: what is accepted, what is refused and how, and the schema for editors."""
+"""Designs: accepted values, refused values with their messages, and the schema for editors."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import cmpdesign
 from cmpdesign.design.design import Design, design_schema, design_schema_text, load_design
+from cmpdesign.design.templates import templates_folder
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.build import build_layout
 from cmpdesign.patterns import registered_patterns
@@ -82,7 +82,7 @@ def test_values_out_of_range_name_value_limit_and_unit(fields: dict[str, object]
         ({"clip": "circle", "layers": 3, "pitch_mm": 1}, "needs clip_diameter_mm"),
         ({"clip": "rectangle", "layers": 3, "pitch_mm": 1, "clip_width_mm": 9}, "needs clip_height_mm"),
         ({"layers": 3, "pitch_mm": 1, "clip_width_mm": 9}, 'needs clip = "rectangle"'),
-        ({"layers": 3, "pitch_mm": 1, "clip": "circle", "clip_diameter_mm": 2}, "nothing inside a border"),
+        ({"layers": 3, "pitch_mm": 1, "clip": "circle", "clip_diameter_mm": 2}, "no area inside a border"),
     ],
 )
 def test_under_and_over_determined_sizes_say_how_to_mend(fields: dict[str, object], words: str) -> None:
@@ -158,7 +158,7 @@ def test_a_design_of_ones_own(tmp_path: Path) -> None:
 
 
 def test_the_shipped_schema_is_current() -> None:
-    shipped = Path(cmpdesign.__file__).with_name("design.schema.json")
+    shipped = templates_folder() / "design.schema.json"
     assert shipped.read_text(encoding="utf-8") == design_schema_text()
 
 

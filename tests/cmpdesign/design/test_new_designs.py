@@ -14,12 +14,10 @@ from pydantic import BaseModel
 
 from cmpdesign import Design, DesignError, build_layout, load_design
 from cmpdesign.design.commented_toml import STARTING_VALUES, commented_toml
-from cmpdesign.design.templates import find_template, template_kinds, template_words
+from cmpdesign.design.templates import find_template, template_kinds, template_words, templates_folder
 from tests.support.command import refused, run
 
-SCHEMA = json.loads(
-    (Path(__file__).parents[3] / "cmpdesign" / "design.schema.json").read_text(encoding="utf-8")
-)
+SCHEMA = json.loads((templates_folder() / "design.schema.json").read_text(encoding="utf-8"))
 COMMENTED_FIELD = re.compile(r"^# (\w+) = (.*)$", re.MULTILINE)
 
 
@@ -87,7 +85,7 @@ def test_none_takes_away_and_what_tells_of_a_file_stays_there(tmp_path: Path) ->
         ({"a": "extends = 3"}, "must be a name or a path"),
         ({"a": 'extends = ""'}, "must be a name or a path"),
         ({"a": 'extends = "."'}, "cannot be read"),
-        ({"a": 'extends = "b.toml"', "b": "layers = ="}, "b.toml: is no valid TOML: "),
+        ({"a": 'extends = "b.toml"', "b": "layers = ="}, "b.toml is no valid TOML: "),
         ({"a": 'extends = "b.toml"', "b": 'pattern = "round"\nlayer = 3'}, "layer is unknown"),
         ({"a": 'extends = "tac3d"\nlaser = 3'}, "laser = 3 must be"),
         (

@@ -177,7 +177,9 @@ def test_the_touched_surface_is_continued_on_wish(made: Path, tmp_path: Path) ->
     out = tmp_path / "out.npz"
     result = run("reconstruct", *files, str(made / "frames"), "-o", str(out), "--surface")
     assert result.exit_code in (0, 1), result.output
-    assert "1 mm below the touched surface; surface_* of that surface" in " ".join(result.output.split())
+    assert "1 mm below the touched surface; surface_* are of the touched surface" in " ".join(
+        result.output.split()
+    )
     table = np.load(out)
     pattern, surface = table["3D_Displacements"][:, :MARKERS], table["surface_displacement_mm"]
     assert surface.shape == pattern.shape and (np.isnan(surface) == np.isnan(pattern)).all()
@@ -263,7 +265,7 @@ def test_given_poses_are_kept_or_found_again(made: Path, tmp_path: Path) -> None
         ("one.toml", "0", (), "the rig has 1 view; depth needs two or more"),
         ("twins.toml", "0", (), "stand too near to each other to tell depth"),
         ("large.toml", "0", (), "reaches beyond the image of 960 x 360 px"),
-        ("mirror.toml", "0", (), "check which of them are mirrored"),
+        ("mirror.toml", "0", (), "check which views are mirrored"),
         ("rig.toml", "9", (), "has fewer frames"),
         ("rig.toml", "none.png", (), "none.png"),
         ("rig.toml", "2", (), "view 'right' shows no pattern at rest (no_"),

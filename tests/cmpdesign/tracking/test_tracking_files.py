@@ -1,4 +1,4 @@
-"""``cmpdesign track`` on real files: its tables agree, and what was tracked survives whatever ends a run."""
+"""``cmpdesign track`` on real files: its tables agree, and tracked frames are kept for any end of a run."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ def test_arrays_that_do_not_fit_are_kept_in_pieces_and_recovered(made: Path, tmp
     table = loaded(tmp_path / "a.npz")
     np.testing.assert_allclose(table["xy_px"], whole["xy_px"])
     np.testing.assert_allclose(table["rest_xy_px"], whole["rest_xy_px"])
-    assert "nothing to recover" in refused(*arguments, "--recover")
+    assert "no table to recover" in refused(*arguments, "--recover")
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Markers that are not shown, on surfaces that are flat or bent: repaired where what is around them says, else lost."""
+"""Hidden markers on flat or bent surfaces: repaired where the surroundings determine the position, else lost."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ONE, GAPS, RING = [0], [0, 1, 3, 5], [0, 1, 2, 3, 4, 5, 6]  # markers whose cell
 
 
 def twisted(turn: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """A surface turned the more the nearer to the middle (rad): what lies there is odd about marker 0."""
+    """A surface turned by an angle (rad) that grows towards the middle; the surface is odd about marker 0."""
 
     def surface(xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         x, y = xy_mm.T
@@ -43,8 +43,7 @@ def without_cells_at(pattern: str, markers: list[int]) -> Damage:
     [
         (ONE, 0.0, 1.0, 0.002),
         (ONE, 0.4, 1.0, 0.006),
-        (ONE, 0.9, 1.0, 0.0065),
-        (ONE, 2.0, None, 0.0),
+        (ONE, 0.9, None, 0.0),
         (GAPS, 0.0, 1.0, 0.002),
         (GAPS, 0.4, 1.0, 0.02),
         (GAPS, 0.9, None, 0.0),
@@ -58,7 +57,7 @@ def without_cells_at(pattern: str, markers: list[int]) -> Damage:
 def test_what_is_missing_is_repaired_as_far_as_the_surface_lets(
     pattern: str, preset: str, gone: list[int], turn: float, least: float | None, limit_edges: float
 ) -> None:
-    """One marker amid whole rings is, where a quadratic misses them, too; amid gaps, or where all turns, it is lost."""
+    """Where a quadratic through the markers around misses these, as where all turns, a marker is lost."""
     seen = shown(
         pattern, layers=LAYERS, size=SIZE, camera=Camera(EDGE_PX), damage=without_cells_at(pattern, gone),
         surface=twisted(turn) if turn else None,

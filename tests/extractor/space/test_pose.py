@@ -1,4 +1,6 @@
-"""Poses from the rest frame: found, calibrated, mirrored, jointly, and refused where the image does not tell them."""
+"""Poses from the rest frame: found, calibrated, mirrored, jointly, and refused where the image does not determine the
+pose.
+"""
 
 from __future__ import annotations
 
@@ -137,7 +139,7 @@ def test_a_wrong_mirror_puts_a_view_on_the_other_side_and_is_refused() -> None:
 
 
 def test_a_surface_that_was_pressed_at_rest_is_not_taken_for_the_layout() -> None:
-    """What is no layout at rest shows in the misfit."""
+    """A deformed layout has a large misfit."""
     views = pair()
     poses = Reconstructor(LAYOUT, unplaced(views), rest(views, 9, xyz_mm=pressed(LAYOUT.xy_mm, 0.3))).poses
     assert poses.misfit > 2

@@ -1,4 +1,4 @@
-"""Points and surfaces in space: covariances against Monte Carlo, what is refused and why, what a lost view leaves."""
+"""Points and surfaces in space: covariances against Monte Carlo, refused input with reasons, results of a lost view."""
 
 from __future__ import annotations
 
@@ -70,7 +70,9 @@ def test_the_covariance_is_what_errors_are(count: int) -> None:
 
 
 def test_the_weights_matter() -> None:
-    """One view ten times as noisy: the plain middle between the rays is worse than what the covariances make of it."""
+    """One view ten times as noisy: the plain middle between the rays is worse than the mean weighted by the
+    covariances.
+    """
     views, rng = pair(), np.random.default_rng(3)
     best, plain = [], []
     for _ in range(10):

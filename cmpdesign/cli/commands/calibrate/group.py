@@ -1,4 +1,4 @@
-"""``cmpdesign calibrate``: what one sensor is like, measured from its pictures."""
+"""``cmpdesign calibrate``: properties of one sensor, measured from its pictures."""
 
 from __future__ import annotations
 

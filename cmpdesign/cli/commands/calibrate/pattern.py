@@ -1,4 +1,4 @@
-"""``cmpdesign calibrate pattern``: where the markers of one pad were made, from pictures of the pad at rest."""
+"""``cmpdesign calibrate pattern``: measures the places of one pad's markers from pictures of the pad at rest."""
 
 from __future__ import annotations
 
@@ -38,14 +38,17 @@ def pattern(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="Layout to write, with the places as made: .json."
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Layout file to write, with the measured places of the markers: .json.",
         ),
     ],
     preset: PresetOption = "accurate",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Measure where the markers of one pad were made; read the pad's pictures with the written layout."""
+    """Measure the places of one pad's markers. Read the pad's pictures with the written layout."""
     from cmpdesign.api.workshop import calibrate_pattern
     from cmpdesign.cli.documents.reading import CalibratePatternDocument
     from cmpdesign.watch import watched
@@ -63,7 +66,7 @@ def pattern(
 
 
 def _figures(learnt: LearntLayout) -> dict[str, Any]:
-    """The fields of ``CalibratePatternDocument`` that tell of the pad."""
+    """The fields of ``CalibratePatternDocument`` that describe the pad."""
     import numpy as np
 
     made, worst = learnt.layout.as_made, int(learnt.picture_z.argmax())

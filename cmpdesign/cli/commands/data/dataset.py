@@ -46,7 +46,7 @@ def dataset(
 ) -> None:
     """Make a data set: pictures, truth, markers, forces and parameters of the frames that a plan names.
 
-    A shard that is there is not made again: the same command goes on where a run ended. The same plan gives the same
+    A finished shard is not made again: the same command continues an interrupted run. The same plan gives the same
     bytes on any number of workers.
     """
     from cmpdesign.data.run import make_dataset, parse_shards

@@ -32,7 +32,7 @@ def extract(
         ),
     ],
     frames_a_shard: Annotated[
-        int, typer.Option(min=1, help="Frames of a shard; a video is cut at the next key frame.")
+        int, typer.Option(min=1, help="Frames in a shard; a video is cut at the next key frame.")
     ] = 1000,
     scheduler: SchedulerOption = "local",
     workers: WorkersOption = None,
@@ -41,9 +41,9 @@ def extract(
     side: SideOption = "designed",
     channels: ChannelsOption = "bgr",
 ) -> None:
-    """Read the markers of every frame of many sources into Parquet files, each frame by itself.
+    """Read the markers of every frame of many sources into Parquet files, each frame independently of the others.
 
-    A shard that is there is not made again: the same command goes on where a run ended.
+    A finished shard is not made again: the same command continues an interrupted run.
     """
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler

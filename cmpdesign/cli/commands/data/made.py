@@ -1,4 +1,4 @@
-"""What is said of a data set that was made."""
+"""The summary of a data set that was made."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def print_made(folder: Path, made: Progress) -> None:
-    """Say what the data set holds, and end the command."""
+    """Print the contents of the data set, and end the command."""
     from cmpdesign.cli.documents.data import DatasetDocument
 
     share = "" if made.shards == made.of_shards else f" of {made.of_shards}"

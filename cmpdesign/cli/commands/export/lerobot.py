@@ -28,7 +28,7 @@ def lerobot(
     ],
     task: Annotated[str, typer.Option(help="Task that the runs show, in words.")] = "contact",
     fps: Annotated[
-        float | None, typer.Option(help="Frames per second. [default: as the runs' times say]")
+        float | None, typer.Option(help="Frames per second. [default: from the runs' times]")
     ] = None,
     robot: Annotated[str | None, typer.Option(help="Type of the robot. [default: none]")] = None,
     images: ImagesOption = None,
@@ -58,13 +58,13 @@ def lerobot(
 
 
 def _warn_of_uneven_times(runs: Sequence[Path], fps: float) -> None:
-    """LeRobot knows frames at an even rate only."""
+    """Warn of uneven times: LeRobot's frames have an even rate."""
     from cmpdesign.tracking.export.runs import largest_shift_s, read_run
 
     for path in runs:
         shift_s = largest_shift_s(read_run(path), fps)
         if shift_s > 0.5 / fps:
             print_warning(
-                f"{printable_path(path)}: its times differ by up to {shift_s:.3g} s from {fps:g} frames per second; "
-                "observation.tactile.time_s has them"
+                f"{printable_path(path)}: the times differ by up to {shift_s:.3g} s from {fps:g} frames per second; "
+                "observation.tactile.time_s holds the times of the run"
             )

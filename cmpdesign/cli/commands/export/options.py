@@ -1,4 +1,4 @@
-"""Arguments and options that the commands share which export runs."""
+"""Arguments and options shared by the commands that export runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 RunsArgument = Annotated[
     list[Path],
-    typer.Argument(metavar="RUN", help="Files of track or reconstruct, .npz; each is an episode."),
+    typer.Argument(metavar="RUN", help="Files of track or reconstruct, .npz; each file is an episode."),
 ]
 
 ImagesOption = Annotated[

@@ -23,7 +23,7 @@ def init(
         typer.Option(
             "--extends",
             metavar="DESIGN",
-            help="Begin with another design: a template's name, or a file's path from NAME's folder. "
+            help="Begin with another design: a template's name, or the path of a file, relative to NAME's folder. "
             "[default: a honeycomb of 10 layers]",
             autocompletion=complete_design,
         ),
@@ -42,7 +42,7 @@ def init(
     from cmpdesign.inputs.files import path_exists
 
     if not name.name:
-        raise CmpDesignError(f"{name}: is a folder; give a design's name")
+        raise CmpDesignError(f"{name} is a folder; give a design's name")
     path = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
     if path_exists(path) and not force:
         raise CmpDesignError(f"{path}: exists already; choose another name, or replace it with --force")

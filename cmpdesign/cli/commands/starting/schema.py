@@ -1,4 +1,4 @@
-"""``cmpdesign schema``: prints the JSON Schema of a design, or of what a command prints with ``--json``."""
+"""``cmpdesign schema``: prints the JSON Schema of a design, or of the document of a command with ``--json``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def schema(
         list[str] | None,
         typer.Argument(
             metavar="COMMAND",
-            help="A command, as in verify, or message for the lines on stderr. [default: a design's TOML file]",
+            help="A command, as in verify; or message, for the lines on stderr. [default: a design's TOML file]",
         ),
     ] = None,
 ) -> None:

@@ -1,4 +1,4 @@
-"""``cmpdesign templates``: lists and shows what is shipped."""
+"""``cmpdesign templates``: lists and shows the templates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = ("cmpdesign templates --kind scenes", "cmpdesign templates --show tac3d")
 Kind = Literal["designs", "scenes", "plans", "machines", "materials", "silicones", "sensors"]
-# What takes the names of a kind.
+# The command or option that takes the names of a kind.
 TAKERS = {
     "designs": "for build, check, init --extends and evaluate designs",
     "scenes": "for render --scene",

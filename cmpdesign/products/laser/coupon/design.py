@@ -1,4 +1,4 @@
-"""The coupon: a test piece with openings from whose width the kerf is measured.
+"""The coupon: a test piece; the kerf is measured from the widths of its openings.
 
 o                 o        o: fiducials, cut round; their centres do not depend on the kerf
   [] |   [] |   [] |       []: square; |, -: narrow slots; the beam's centre runs along the nominal outlines,
@@ -87,12 +87,12 @@ class Coupon:
 
     @property
     def narrowing_mm(self) -> float:
-        """How much narrower a cut is at the back than at the front, by the taper."""
+        """Width of a cut at the front less its width at the back, by the taper."""
         return 2 * self.thickness_mm * math.tan(math.radians(self.taper_deg))
 
     @property
     def narrow_face(self) -> Face:
-        """The face through whose openings the ground is seen: the narrower one; the front without a taper."""
+        """The face with the narrower openings, through which the ground is seen; the front without a taper."""
         return "back" if self.taper_deg > 0 else "front"
 
 

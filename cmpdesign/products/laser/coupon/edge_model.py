@@ -1,8 +1,10 @@
 """The response of a picture by its own edges.
 
-Blur in linear light makes a straight edge symmetric; the response then bends it. The model draws every edge that way:
-a symmetric edge (a sum of Gaussian ones, the same for all edges) between the light of sheet and opening, encoded by a
-response. What it cannot draw is not symmetric in that light. The exponent of the light is fitted, or held at 1.
+Blur in linear light makes a straight edge symmetric; the response then makes the edge asymmetric. The model draws every
+edge in this order: a symmetric edge (a sum of Gaussian ones, the same for all edges) between the light of sheet and
+    opening, encoded by a
+response. The residual is the part that is not symmetric in this light. The exponent of the light is fitted, or held at
+1.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from extractor.image.response import decode_values, encode_light
 
 # The symmetric edge: a core and two wider parts, each a Gaussian edge averaged over the pixel. Its parameters are the
 # log of the core's deviation, in units of the first guess, the logs of both parts' shares over the core's, and the logs
-# of their widths over the core's: what they start from, and how far they may go from there.
+# of their widths over the core's: start values, and largest changes.
 SHAPE_START = np.array([0.0, -2.5, -3.5, np.log(1.7), np.log(5.0)])
 SHAPE_DEVIATION = np.array([1.0, 1.5, 1.5, 0.2, 0.3])
 SHAPE_STEP = 1e-4
@@ -63,13 +65,13 @@ class EdgeState:
 
 @dataclass(frozen=True, eq=False)
 class EdgeFit:
-    """How well a response draws the edges.
+    """The fit of the edges by a response.
 
     Attributes:
         exponent: of the light, relative to the response: linear light is light ** exponent.
         sigma: its standard deviation; 0 where the exponent is held.
         squares: sum of the squares of the residuals over their deviations.
-        scatter: how much larger the variance of the exponent is by its scatter between edges than by the deviations.
+        scatter: variance of the exponent by its scatter between edges, over its variance by the deviations.
         residual: (N,) measured less drawn value of each bin.
         state: the parameters.
     """
@@ -85,7 +87,7 @@ class EdgeFit:
 class EdgeModel:
     """The model of one picture's edges by one response (256,) of light 0 to 255.
 
-    ``deviation`` (N,) is that of the mean value of each bin.
+    ``deviation`` (N,) is the deviation of the mean value of each bin.
     """
 
     def __init__(self, edges: EdgeValues, light_of_value: Values, deviation: Values) -> None:
@@ -102,7 +104,7 @@ class EdgeModel:
         return self._fit(state, free_exponent=True)
 
     def _fit(self, state: EdgeState, free_exponent: bool) -> EdgeFit:
-        """Levenberg-Marquardt; the exponent's deviation is that between edges."""
+        """Levenberg-Marquardt; the exponent's deviation is its deviation between edges."""
         system = self._system(state, free_exponent)
         damping = 1e-3
         for _ in range(STEPS):
@@ -235,7 +237,7 @@ class _System:
         return _Step(solved[:, :, -1] - solved[:, :, :-1] @ change, change)
 
     def drawn(self, step: _Step) -> Values:
-        """(N,) what a step changes."""
+        """(N,) the change of the residuals by a step."""
         own = (self.matrix[:, :OWN] * step.own[self.edges.edge]).sum(axis=1)
         return np.asarray(own + self.matrix[:, OWN:] @ step.common)
 
@@ -280,7 +282,7 @@ def bin_deviations(edges: EdgeValues, residual: Values | None = None) -> Values:
 
     Args:
         edges: the bins. Differences of neighbouring bins far from the edges give the noise of one pixel.
-        residual: (N,) of a fit: what exceeds the noise (compression bends edges) is added.
+        residual: (N,) of a fit: the part above the noise (compression changes edges) is added.
     """
     far = np.abs(edges.distance_px) > 0.6 * np.abs(edges.distance_px).max()
     together = (edges.edge[1:] == edges.edge[:-1]) & (edges.distance_px[1:] * edges.distance_px[:-1] > 0)

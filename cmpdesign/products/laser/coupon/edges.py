@@ -46,7 +46,7 @@ def read_edges(coupon: Coupon, image: Image, fit: FiducialFit, kerf_mm: float) -
         coupon: the coupon.
         image: (H, W, 3) uint8 or uint16.
         fit: the map of the coupon.
-        kerf_mm: about the kerf, so that edges are where they are expected.
+        kerf_mm: approximate kerf, for the expected places of the edges.
     """
     reach_mm = min(REACH_MM, REACH_PX / fit.scale)
     bins: list[Values] = []

@@ -25,7 +25,7 @@ def find_fiducials(gray: NDArray[np.uint8], coupon: Coupon) -> Values:
     """(5, 2) approximate centres of the fiducials in the coupon's order, px.
 
     Raises:
-        PhotoError: five round regions in the coupon's places are not there.
+        PhotoError: there are no five round regions in the coupon's places.
     """
     marks = np.array(coupon.fiducials_mm)
     best: tuple[float, Values] | None = None

@@ -1,8 +1,8 @@
 """Profiles across the openings of a coupon, and their widths.
 
 An opening's width is the sum, across it, of the light in excess of the sheet's, divided by the excess inside. Blur
-spreads light and does not change the sum. A square shows its own excess. A blurred slot is too narrow for that: its
-excess is the excess of its patch's square, at the light that falls on the slot.
+spreads light and does not change the sum. A square shows its own excess. A blurred slot is too narrow to show its own
+excess: its excess is the excess of its patch's square, at the light that falls on the slot.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class OpeningProfile:
 
 
 def measured_directions(coupon: Coupon) -> list[Across]:
-    """What is measured: a square in both directions, a slot across."""
+    """The measured directions: both directions of a square, the direction across a slot."""
     found = []
     for number, patch in enumerate(coupon.patches):
         for opening in patch.openings:
@@ -96,7 +96,7 @@ def measured_directions(coupon: Coupon) -> list[Across]:
 
 
 def sheet_and_opening_points(across: Across) -> tuple[Values, Values]:
-    """(N, 2) places on the sheet beside an opening, and inside it (none where it is narrow), in mm."""
+    """(N, 2) places on the sheet beside an opening, and inside the opening (none for a narrow opening), in mm."""
     half = across.width_mm / 2
     place = np.linspace(-half - GROUND_MM, half + GROUND_MM, 201)
     points = _grid(across, place, 24).reshape(-1, 2)
@@ -120,7 +120,7 @@ def read_profiles(coupon: Coupon, picture: CouponPicture) -> list[OpeningProfile
 
 
 class _RawProfile(NamedTuple):
-    """A profile before its excess is known; ``own`` (BANDS, N) is the excess that a wide opening shows."""
+    """A profile before its excess is known; ``own`` (BANDS, N) is the excess of a wide opening."""
 
     across: Across
     place_mm: Values
@@ -130,7 +130,7 @@ class _RawProfile(NamedTuple):
 
 
 def _grid(across: Across, place: Values, rows: int) -> Values:
-    """(rows, N, 2) points of an opening: rows along it, ``place`` across."""
+    """(rows, N, 2) points of an opening: rows along the opening, ``place`` across."""
     along = (np.arange(rows) + 0.5) / rows - 0.5
     u, v = np.meshgrid(place, along * LENGTH_SHARE * across.length_mm)
     centre = (across.opening.x_mm, across.opening.y_mm)
@@ -158,7 +158,7 @@ def _raw_profile(across: Across, picture: CouponPicture) -> _RawProfile:
 
 
 def _line(light: Values, place: Values, where: NDArray[np.bool_]) -> Values:
-    """(BANDS, N) a straight line along each profile, fitted where a mask says."""
+    """(BANDS, N) a straight line along each profile, fitted to the points of a mask."""
     basis = np.stack([np.ones_like(place), place])
     return np.asarray(light[:, where] @ np.linalg.pinv(basis[:, where]) @ basis)
 
@@ -181,7 +181,7 @@ def _quadratic(xy: Values) -> Values:
 
 
 def _fit_illumination(raw: list[_RawProfile]) -> _Illumination:
-    """Fit the light to what sheet and wide openings show; both are even in themselves, up to a factor each."""
+    """Fit the light to the values of sheet and wide openings; each is even, up to a factor."""
     places = np.array([(one.across.opening.x_mm, one.across.opening.y_mm) for one in raw])
     centre, size = places.mean(axis=0), float(np.ptp(places, axis=0).max()) / 2
     basis = _quadratic((places - centre) / size)

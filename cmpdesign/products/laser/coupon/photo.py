@@ -1,8 +1,9 @@
 """The kerf from a photo or scan of a coupon.
 
 The fiducials give the map from the coupon to the picture. Widths are sums of light, so values become light first, by
-the response that the user or the file states, else by sRGB; the edges of the openings then tell whether that is right
-(``response_fit``). A cut through the sheet is seen as wide as its narrower face; the taper gives the other face.
+the response that the user or the file states, else by sRGB; the edges of the openings then show whether the response is
+right (``response_fit``). The visible width of a cut through the sheet is that of the narrower face; the taper gives the
+other face.
 """
 
 from __future__ import annotations
@@ -63,11 +64,11 @@ class CouponReading:
     Attributes:
         patches: the kerf of each patch at the face that was seen.
         face: the face that was seen.
-        narrowing_mm: how much narrower cuts are at the back than at the front, by the stated taper.
+        narrowing_mm: width of cuts at the front less the width at the back, by the stated taper.
         scale_px_mm: pixels per millimetre.
         fit_mm: RMS distance of the fiducials from their places by the fitted map.
         from_back: the picture is taken from the coupon's back.
-        response: how values became light, in a few words.
+        response: conversion of values to light, in a few words.
     """
 
     patches: tuple[PatchKerf, ...]
@@ -99,15 +100,15 @@ def read_coupon(
     Args:
         coupon: the coupon that was cut.
         image: (H, W, 3) uint8 or uint16 BGR; openings are darker or brighter than the sheet.
-        response: how light became values, as the user knows it; None: ``stated``, else sRGB (16 bits: or linear), as
+        response: relation of light and values, stated by the user; None: ``stated``, else sRGB (16 bits: or linear), as
             far as the picture's edges agree, or the exponent that makes them symmetric.
         stated: the response that the file states.
-        face: the face whose openings are seen; None: the narrower one by the coupon's taper.
+        face: the face whose openings are seen; None: the face with the narrower openings, by the coupon's taper.
 
     Raises:
         PhotoError: the coupon is not found, too small, clipped, or has too little contrast; its edges contradict the
             response; the taper would close the cuts.
-        ValueError: a response that is none.
+        ValueError: no response.
     """
     approximate = find_fiducials(_eight_bit_gray(image), coupon)
     reader = _CouponReader(coupon, image, approximate)

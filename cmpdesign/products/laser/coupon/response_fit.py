@@ -1,8 +1,8 @@
-"""The kerfs of a picture of which the response is expected but not known, by its edges.
+"""The kerfs of a picture whose response is expected but not known; the edges determine the response.
 
-Expected responses (sRGB, or what the file states) and the family of exponents around 2.2 are weighed by how well
-symmetric edges in their light draw the picture's edges. Kerfs are the weighted means over them, and the deviation
-contains what the edges leave open.
+Expected responses (sRGB, or the response in the file) and the family of exponents around 2.2 are weighted by the fit of
+symmetric edges in their light to the picture's edges. Kerfs are the weighted means over the responses, and the
+deviation contains the uncertainty of the response.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from extractor.image.response import Response, light_of_values
 EXPONENT, EXPONENT_DEVIATION, EXPONENT_SHARE = 2.2, 0.25, 0.5
 # Relative exponents from which fits start: edges of compressed pictures have several minima.
 EXPONENT_STARTS = (0.85, 1.0, 1.15)
-# The same for a response that is stated and may be far off: linear for sRGB.
+# The same for a stated response that may be wrong: linear for sRGB.
 STATED_STARTS = (0.45, 1.0, 2.2)
-# Fits this close, relative to the exponent, are one.
+# Fits whose exponents differ by less, relative to the exponent, count as one fit.
 SAME_EXPONENT = 0.02
-# Compression bends edges: residuals exceed the noise, and the exponent is off by so much of itself for each unit of
-# their mean square over the noise's, beyond the usual one. Fitted to 70 pictures of the benchmark (seed 7): exponents
+# Compression changes edges: residuals exceed the noise. The exponent has this relative error for each unit of
+# their mean square over the noise's, above the usual value. Fitted to 70 pictures of the benchmark (seed 7): exponents
 # have errors over stated deviations of 0.9 without JPEG, with JPEG of 2.0 without this term and 1.1 with it.
 MISFIT_DEVIATION, USUAL_MISFIT = 0.2, 1.1
-# Step of the exponent by which the change of kerfs is taken.
+# Step of the exponent for the derivative of the kerfs.
 EXPONENT_STEP = 0.1
 # Edges further from a response than this many deviations contradict it.
 LARGEST_MISFIT = 4.0
@@ -48,7 +48,7 @@ class KerfsInLight:
 
 @dataclass(frozen=True, eq=False)
 class ResponseFit:
-    """Kerfs over all responses that the edges allow, as ``KerfsInLight``, and these in a few words."""
+    """Kerfs over all responses that the edges allow, as ``KerfsInLight``, and these responses in a few words."""
 
     kerfs: KerfsInLight
     description: str
@@ -100,7 +100,7 @@ def fit_response(read: KerfReader, edges: EdgeValues, expected: Sequence[Respons
         raise PhotoError(
             f"the edges are symmetric for an exponent of {EXPONENT * best.exponent:.2f}, expected "
             f"{' or '.join(map(response_name, expected))} or 2.2 +- 0.5: the picture has been sharpened or its "
-            "contrast changed; scan without that, or state --response"
+            "contrast changed; scan without sharpening and contrast, or state --response"
         )
     logs = np.array([one.log_weight for one in candidates])
     weights = np.exp(logs - logs.max())
@@ -128,7 +128,7 @@ class _FreeFits(NamedTuple):
 
 
 def _free_fits(edges: EdgeValues, response: Response, starts: Sequence[float]) -> _FreeFits:
-    """Fit the exponent twice, the second time with the deviations that the first fit's residuals show."""
+    """Fit the exponent twice, the second time with the deviations from the first fit's residuals."""
     light_of_value = light_of_values(response)
     first = [EdgeModel(edges, light_of_value, bin_deviations(edges)).fit_exponent(each) for each in starts]
     first.sort(key=lambda one: one.squares)
@@ -146,13 +146,13 @@ def _free_fits(edges: EdgeValues, response: Response, starts: Sequence[float]) -
 
 
 def _with_bend(fit: EdgeFit, deviation: float) -> EdgeFit:
-    """A fit with a relative deviation of the exponent added, and its squares worth as much less."""
+    """A fit with a relative deviation added to the exponent's, and its squares reduced accordingly."""
     sigma = float(np.hypot(fit.sigma, deviation * fit.exponent))
     return replace(fit, sigma=sigma, scatter=fit.scatter * (sigma / fit.sigma) ** 2)
 
 
 def _exponent_candidate(read: KerfReader, free: EdgeFit, best: EdgeFit) -> _Candidate:
-    """An exponent that the edges ask for, drawn towards the usual one as far as they leave it open."""
+    """The exponent by the edges, combined with the usual exponent, weighted by their deviations."""
     asked, sigma = EXPONENT * free.exponent, EXPONENT * free.sigma
     precision = 1 / sigma**2 + 1 / EXPONENT_DEVIATION**2
     exponent = (asked / sigma**2 + EXPONENT / EXPONENT_DEVIATION**2) / precision

@@ -1,6 +1,6 @@
 """The response that an image file states: an ICC profile, or PNG's gamma.
 
-Read are the tone curves of matrix and gray profiles ("rTRC", "gTRC", "bTRC", "kTRC") of types "curv" and "para", as
+The tone curves of matrix and gray profiles ("rTRC", "gTRC", "bTRC", "kTRC") of types "curv" and "para" are read, as
 ICC.1 defines them. Profiles of tables ("A2B0") state no curves.
 """
 
@@ -23,12 +23,12 @@ TONE_CURVES = (b"rTRC", b"gTRC", b"bTRC", b"kTRC")
 HEADER_BYTES, ENTRY_BYTES, MAX_TAGS = 128, 12, 1000
 # Largest difference of light (0 to 255) from sRGB's for a curve to be sRGB.
 SRGB_TOLERANCE = 0.3
-# Parameters of each "para" function, in the order g a b c d e f, and what is left out.
+# Parameters of each "para" function, in the order g a b c d e f, and the omitted parameters.
 PARAMETERS = (1, 3, 4, 5, 7)
 
 
 def stated_response(path: str | Path) -> Response | None:
-    """The response that a file states; None if it states none, or cannot be read."""
+    """The response that a file states; None if the file states no response or cannot be read."""
     from PIL import Image, UnidentifiedImageError
 
     try:

@@ -15,7 +15,7 @@ from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.job import LaserPass, PassKind
 from cmpdesign.products.laser.paths.strokes import Strokes
 
-# Pauses after the kinds of passes that work by hand follows; the last pass has none.
+# Pauses after the kinds of passes that are followed by manual work; the last pass has no pause.
 PAUSES: Mapping[PassKind, str] = {
     "holes": "M0 ; put the pins into the holes, they stay to the end",
     "cells": "M0 ; take the pad out, fill, cure, put it back on its pins",

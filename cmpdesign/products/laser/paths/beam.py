@@ -20,7 +20,7 @@ Points = NDArray[np.float64]
 class BeamFootprint:
     """Half-axes of the footprint, mm: ``x_mm`` is half the kerf of cuts along y, ``y_mm`` of cuts along x.
 
-    Both are 0 for paths that are not compensated: such a beam has no beam units and leaves the path itself.
+    Both are 0 for paths that are not compensated: a beam without width has no beam units and burns the path itself.
     """
 
     x_mm: float
@@ -48,7 +48,7 @@ class BeamFootprint:
 
     @property
     def narrow_mm(self) -> float:
-        """The least width of a cut over all directions."""
+        """The smallest width of a cut over all directions."""
         return 2 * min(self.x_mm, self.y_mm)
 
     @property
@@ -67,7 +67,7 @@ class BeamFootprint:
     def at_depth(self, depth_mm: float, taper_deg: float) -> BeamFootprint:
         """The footprint at a depth below the front, if each wall leans inward by the taper.
 
-        Half-axes of zero or less mean that the cut does not reach this depth; a beam without width stays as it is.
+        Half-axes of zero or less mean that the cut does not reach this depth; a beam without width does not change.
         """
         if self.is_point:
             return self

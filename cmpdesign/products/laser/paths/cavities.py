@@ -150,7 +150,7 @@ def burnt_outlines_mm(cavities: Cavities, beam: BeamFootprint) -> Points:
     share = np.linspace(0, 1, ARC_POINTS)
     angle = from_angle[..., None] + share * (to_angle - from_angle)[..., None]
     arc_along, arc_across = length[..., None] + np.cos(angle), np.sin(angle)
-    # A burn that leaves the corner on the disc itself leaves it at the arc's own end, to the last bit.
+    # A burn that leaves the corner on the disc itself ends at the arc's own end, to the last bit.
     first, last = along_in < length, along_out < length
     along = np.concatenate(
         [
@@ -175,7 +175,7 @@ def burnt_outlines_mm(cavities: Cavities, beam: BeamFootprint) -> Points:
 
 
 def burnt_shapes(outlines: Points) -> NDArray[np.object_]:
-    """(N,) holes as valid shapes of (N, P, 2) outlines: what an outline runs around once or twice is burnt."""
+    """(N,) holes as valid shapes of (N, P, 2) outlines: an area that an outline encloses once or twice is burnt."""
     import shapely
 
     shapes = np.asarray(shapely.polygons(outlines), dtype=np.object_)

@@ -7,8 +7,9 @@
              /   P   \\  corner of the path    unit, half the kerf, at 60 degrees). A spur P-T moves the beam
             /   / \\   \\                       further in and also burns area beside the cell.
 
-The balanced spur burns as much area beside the cell as it leaves of the corner. The two sides of a spur are computed
-separately, because a spur that bisects a corner at one face does not exactly bisect the corner at the other face.
+The area that a balanced spur burns beside the cell equals the area that is left of the corner. The two sides of a spur
+are computed separately, because a spur that bisects a corner at one face does not exactly bisect the corner at the
+other face.
 """
 
 from __future__ import annotations

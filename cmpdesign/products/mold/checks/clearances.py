@@ -23,7 +23,7 @@ LEAST_STENCIL_WEB_MM, LEAST_MOAT_MM = 0.01, 0.1
 LEAST_PIN_TIP_MM = 0.4
 PINS, JACKS, VENTS, PAD = "a pin hole", "a jack screw's hole", "a vent", "the pad's opening"
 CELLS, EDGE = "the cells", "the outer edge"
-# The change to make, by a feature of the pair; the first one that applies.
+# The change to make, by a feature of the pair; the first change that applies.
 REMEDIES = {
     VENTS: "make mold.vents fewer or mold.vent_mm smaller",
     EDGE: "make mold.wall_mm larger",
@@ -87,7 +87,7 @@ def _stencil_findings(stack: MoldStack) -> Iterator[Finding]:
             _, distances = shapely.STRtree(holes).query_nearest(holes, exclusive=True, return_distance=True)
             least = min(least, float(distances.min()))
         if stack.crown is not None:
-            # On a dome every hole lies in its own facet.
+            # On a dome every hole lies in a separate facet.
             widest = float(open_insets(stack, color).min()) + stack.options.clearance_mm
             least = min(least, 2 * (widest - STENCIL_LEAN * stack.options.stencil_mm))
     if least < LEAST_STENCIL_WEB_MM:
@@ -103,7 +103,7 @@ def _stencil_findings(stack: MoldStack) -> Iterator[Finding]:
 
 
 def _distance_mm(first: Any, second: Any) -> float:
-    """The distance of two shapes; where they overlap, how deep one lies in the other, negative."""
+    """The distance of two shapes; for overlapping shapes, the negative depth of the overlap."""
     import shapely
 
     distance = float(shapely.distance(first, second))

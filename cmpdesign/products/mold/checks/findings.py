@@ -41,8 +41,8 @@ TOOL_LIMITS = {
 SLENDER_ERROR, SLENDER_WARNING = 3.0, 1.5
 DRAFT_MAX_DEG = 15.0
 DRAFT_WARNING_DEG = 0.5
-# Every color's cavities are filled before the next plate comes, so a web never stands free. Thinner ones close where
-# two plates are off by some micrometres.
+# Every color's cavities are filled before the next plate is pressed in, so every web is supported. Thinner webs close
+# where two plates are off by some micrometres.
 WEB_WARNING_MM = 0.01
 # Silicone layers whose sizes differ by more than this at the pad's edge wrinkle.
 MISMATCH_WARNING_MM = 0.1
@@ -185,7 +185,7 @@ def _draft_findings(stack: MoldStack) -> Iterator[Finding]:
     elif draft > DRAFT_MAX_DEG:
         yield Finding("mold.draft_deg", draft, DRAFT_MAX_DEG, "deg", "make it smaller", "error")
     elif draft < DRAFT_WARNING_DEG:
-        remedy = "lean walls by a degree or two, or the cavities tear when the plate is lifted"
+        remedy = "set a draft of one or two degrees, or the cavities tear when the plate is lifted"
         yield Finding("mold.draft_deg", draft, DRAFT_WARNING_DEG, "deg", remedy, "warning")
 
 
@@ -200,13 +200,13 @@ def _sheet_findings(stack: MoldStack) -> Iterator[Finding]:
     }
     for name, thickness in thicknesses.items():
         if thickness < limit:
-            remedy = "cut it from shim stock instead: its shape is plain"
+            remedy = "cut the part from shim stock instead: its shape is flat"
             yield Finding(f"thickness of {name} as {option.tool}", thickness, limit, "mm", remedy, "warning")
     if option.vents and option.vent_mm < min_feature_mm(stack):
         remedy = "make mold.vent_mm larger, or drill the vents"
         yield Finding("mold.vent_mm", option.vent_mm, min_feature_mm(stack), "mm", remedy, "error")
     if not option.vents:
-        remedy = "give the lid some vents, or pour in a vacuum: air stays under it"
+        remedy = "give the lid vents, or pour in a vacuum: air stays under the lid"
         yield Finding("mold.vents", 0, 1, "", remedy, "warning")
     for field in ("wall_mm", "floor_mm", "plate_mm"):
         least = 2 * limit if field != "floor_mm" else 1.5
@@ -244,13 +244,13 @@ def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
     reach = float(np.hypot(*stack.outline_mm.T).max())
     mismatch = (max(scales) - min(scales)) * reach
     if mismatch > MISMATCH_WARNING_MM:
-        remedy = "choose silicones that shrink alike"
+        remedy = "choose silicones of similar shrinkage"
         subject = "difference of the layers' shrinkage at the pad's edge"
         yield Finding(subject, mismatch, MISMATCH_WARNING_MM, "mm", remedy, "warning")
 
 
 def _side_findings(stack: MoldStack) -> Iterator[Finding]:
-    """Findings on what lies between the camera and the pattern: the base layer."""
+    """Findings on the layer between the camera and the pattern: the base layer."""
     base = stack.silicones[0]
     if base.clear is None:
         remedy = "add clear = { value = true, source = ... } to its file if light passes through it"
@@ -313,11 +313,13 @@ def _unused_option_findings(stack: MoldStack) -> Iterator[Finding]:
         return
     edge = crown_edge_mm(option, layout)
     if edge > layout.border_mm:
-        remedy = "taken that wide around the crown, so that vents find room: make it larger, or mold.vent_mm smaller"
+        remedy = "this width is taken around the crown for the vents: make it larger, or mold.vent_mm smaller"
         yield Finding("border_mm", layout.border_mm, edge, "mm", remedy, "warning")
     if "clip" in layout.parameters:
         subject = f"clip outlines of a pad whose edge follows its crown ({option.crown})"
-        yield Finding(subject, 1, 0, "", "only cells are clipped; leave it out to keep them all", "warning")
+        yield Finding(
+            subject, 1, 0, "", "only cells are clipped; leave clip out to keep all cells", "warning"
+        )
 
 
 def moat_to_pin_mm(stack: MoldStack) -> float:

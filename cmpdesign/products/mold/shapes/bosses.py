@@ -9,12 +9,12 @@ from cmpdesign.products.mold.solids.loops import Loop, inset_cells
 from cmpdesign.products.mold.solids.slab_shells import Feature
 from cmpdesign.products.mold.stack.stack import MoldStack
 
-# Tangent of the walls' lean: a stencil's hole widens upwards, so that the stencil releases the paste.
+# Tangent of the walls' angle: a stencil's hole widens upwards, so that the stencil releases the paste.
 STENCIL_LEAN = float(np.tan(np.radians(10.0)))
 
 
 def boss_features(stack: MoldStack, color: int) -> list[Feature]:
-    """Bosses of a color in plan: the tip is the cell that is seen, the root the cavity's open side."""
+    """Bosses of a color in plan: the tip is the visible cell, the root the cavity's open side."""
     height = stack.thickness_mm[1]
     return [Feature(cavity.open, cavity.seen, height) for cavity in cavities(stack, color)]
 

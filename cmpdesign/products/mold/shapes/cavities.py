@@ -7,13 +7,14 @@
       ________\\______/________|________|____
         clear base layer, the camera below
 
-The camera looks at the base layer. A boss stands on the base layer with its tip, so its tip is the cell that is seen:
-nominal but for the corners' radius. Walls lean outwards by the draft. Between two cavities that meet in a corner a web
-stays at the open side, because corners are round. Between two that share a side, as the white cell and its neighbours,
-the web is upright and as wide as the gap.
+The camera sees the base layer. A boss stands on the base layer with its tip, so its tip is the visible cell:
+nominal except for the corners' radius. Walls lean outwards by the draft. Between two cavities that meet in a corner a
+web stays at the open side, because corners are round. Between two that share a side, as the white cell and its
+neighbours, the web is upright and has the width of the gap.
 
-Where the web would be narrower than the gap (large draft, sharp corners), all cells are inset alike. On a domed pad
-every outline lies within its flat facet, so cells are inset by half the gap at the open side, and by the draft besides.
+Where the web would be narrower than the gap (large draft, sharp corners), all cells are inset by the same width. On a
+domed pad every outline lies within its flat facet, so cells are inset by half the gap at the open side, and also by the
+draft.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def open_insets(stack: MoldStack, color: int) -> NDArray[np.float64]:
 
 
 def seen_inset_mm(stack: MoldStack) -> float:
-    """The inset of all cells at the base layer that keeps the webs at the open side as wide as the gap."""
+    """The inset of all cells at the base layer for which the webs at the open side have the width of the gap."""
     return _common_inset_mm(stack)
 
 

@@ -125,7 +125,7 @@ def circle_loop(centre: Points, diameter_mm: float) -> Loop:
 def rounded_polygon(corners: Points, radius_mm: float) -> Loop:
     """A convex polygon (counter-clockwise) whose corners are arcs of the given radius; sharp at radius 0.
 
-    The arcs touch the polygon's sides from inside, as a cutter of that radius leaves them.
+    The arcs touch the polygon's sides from inside, as after a cutter of this radius.
     """
     if radius_mm == 0:
         return polygon_loop(corners)

@@ -1,4 +1,4 @@
-"""Measures of a built solid, computed by the kernel and not from the numbers that describe the solid."""
+"""Measures of a built solid, computed by the kernel, independently of the numbers that describe the solid."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def drafts_deg(shape: Any, low_mm: Point, high_mm: Point) -> tuple[float, float]
             lean = 90.0 - float(
                 np.degrees(np.arcsin(min(1.0, abs(surface.Cylinder().Axis().Direction().Z()))))
             )
-        # The place of a face is tested only if its lean extends the range: most faces lean alike.
+        # The place of a face is tested only if its lean extends the range: most faces have the same lean.
         in_range = least <= lean <= largest
         if lean < LEVEL_DEG and not in_range and _is_within(face, low_mm, high_mm):
             least, largest = min(least, lean), max(largest, lean)

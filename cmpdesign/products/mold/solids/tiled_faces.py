@@ -4,7 +4,7 @@ The kernel's time to check, write and read a face grows with the square of the n
 linear. Horizontal lines cut the face into strips, and short vertical cuts (uprights) cut every strip into tiles of a
 few holes. A horizontal line that meets a hole ends at the hole's rim. An upright keeps clear of every hole.
 
-    +---------------------------+        the outer face: what lies around the box of the tiles
+    +---------------------------+        the outer face: the area around the box of the tiles
     |  +--------+-------+----+  |
     |  | /\\  /\\ |/\\   /\\|/\\  |  |        strips of tiles, their holes inside
     |  +---+----++------+----+  |

@@ -30,7 +30,7 @@ class Silicone(BaseModel):
         density_g_cm3, pot_life_min, cure_h: values at room temperature, for the job sheet.
         inhibited_by: materials of parts on which the silicone's surface stays sticky.
         remedy: remedy against the inhibition.
-        clear: the camera can look through a base layer of it; None: unknown.
+        clear: the camera can see through a base layer of this silicone; None: unknown.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -52,12 +52,12 @@ class Silicone(BaseModel):
 
 
 def silicones() -> dict[str, Path]:
-    """The TOML file of every shipped silicone, by name."""
+    """The TOML file of every silicone template, by name."""
     return {path.stem: path for path in sorted((templates_folder() / "silicones").glob("*.toml"))}
 
 
 def load_silicone(name_or_path: str) -> Silicone:
-    """Load a shipped silicone by name, or a silicone from a TOML file.
+    """Load a silicone template by name, or a silicone from a TOML file.
 
     Raises:
         DesignError: unknown silicone, or a file that does not describe a silicone.

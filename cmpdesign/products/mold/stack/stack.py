@@ -42,7 +42,7 @@ class MoldStack:
 
     Attributes:
         options: the [mold] table.
-        layout: the pattern as it lies in plan, seen from above; the camera looks at it from below.
+        layout: the pattern in plan, seen from above; the camera sees the pattern from below.
         silicones: silicones of the base, the marker and the cover layer.
         outline_mm: (K, 2) the pad's edge at its back, convex, before shrinkage is added.
         crown: crown of a domed pad; None for a flat pad.
@@ -154,12 +154,12 @@ def make_stack(design: Design, layout: Layout) -> MoldStack:
 
 
 def plan_of(layout: Layout) -> Layout:
-    """The layout as it lies in a mold, seen from above: the camera, below, sees the designed side."""
+    """The layout in a mold, seen from above: the camera, below, sees the designed side."""
     return layout if seen_side(layout.mirrored) == "back" else turned_over(layout)
 
 
 def _make_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crown, Points]:
-    """The smallest crown that carries the pattern, and the (K, 2) round or rectangular outline of the pad."""
+    """The smallest crown that contains the pattern, and the (K, 2) round or rectangular outline of the pad."""
     from cmpdesign.layout.outline import circle_outline as round_outline
     from cmpdesign.layout.outline import rectangle_outline
 
@@ -180,7 +180,7 @@ def _make_crown(option: MoldOptions, layout: Layout, scale: float) -> tuple[Crow
     reach = float(radius * np.sin(slope)) + FOOT_MM
     if reach >= radius * np.sin(np.radians(STEEPEST_DEG + 10)):
         raise DesignError(
-            f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm leaves no foot; make it larger"
+            f"mold.crown_radius_mm = {option.crown_radius_mm:g} mm leaves no foot; make the radius larger"
         )
     edge = crown_edge_mm(option, layout)
     if option.crown == "sphere":

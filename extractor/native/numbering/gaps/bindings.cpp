@@ -1,4 +1,4 @@
-// Room "gaps" as Python sees it.
+// Room "gaps" for Python.
 #include "base/binding.hpp"
 
 #include "numbering/gaps/detached_cells.hpp"

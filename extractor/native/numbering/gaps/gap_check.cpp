@@ -1,6 +1,9 @@
 #include "numbering/gaps/gap_check.hpp"
 
 #include <limits>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include "numbering/mesh_parts.hpp"
 #include "numeric/median.hpp"
@@ -232,6 +235,27 @@ class Comparison {
   View<const double, 2> center_;
 };
 
+// The contacts (N, 6) of which both cells are in contact with a third one, else -1.
+//
+// Across a gap a shifted center may bring one wrong pair near enough; three cells are hardly ever.
+Array<std::int32_t, 2> firm_contacts(View<const std::int32_t, 2> neighbours) {
+  Array<std::int32_t, 2> out(neighbours);
+  const Index sides = neighbours.size(1);
+  for (Index i = 0; i < neighbours.size(); ++i)
+    for (Index k = 0; k < sides; ++k) {
+      const std::int32_t j = neighbours(i, k);
+      if (j < 0) continue;
+      const std::int32_t after = neighbours(i, (k + 1) % sides),
+                         before = neighbours(i, (k + sides - 1) % sides);
+      const auto touches = neighbours[j];
+      const bool is_firm = std::any_of(touches.begin(), touches.end(), [=](std::int32_t third) {
+        return third >= 0 && (third == after || third == before);
+      });
+      if (!is_firm) out(i, k) = -1;
+    }
+  return out;
+}
+
 // The number of cells in each block.
 Array<std::int64_t, 1> block_sizes(View<const std::int32_t, 1> block) {
   const std::int32_t last = block.size() > 0 ? *std::max_element(block.begin(), block.end()) : -1;
@@ -240,6 +264,62 @@ Array<std::int64_t, 1> block_sizes(View<const std::int32_t, 1> block) {
     if (b >= 0) ++sizes[b];
   }
   return sizes;
+}
+
+// The block that another one became part of.
+std::int32_t root_of(View<const std::int32_t, 1> parent, std::int32_t block) {
+  while (parent[block] != block) block = parent[block];
+  return block;
+}
+
+// Two blocks, and how many contacts that are not firm lead from one to the other.
+struct LooseContacts {
+  std::int32_t a, b;
+  Index count;
+};
+
+// The loose contacts between blocks, the most numerous first.
+std::vector<LooseContacts> loose_contacts(View<const std::int32_t, 2> neighbours,
+                                          View<const std::int32_t, 1> block) {
+  std::map<std::pair<std::int32_t, std::int32_t>, Index> counts;
+  for (Index i = 0; i < neighbours.size(); ++i)
+    for (const std::int32_t j : neighbours[i])
+      if (j >= 0 && block[i] >= 0 && block[i] < block[j]) ++counts[{block[i], block[j]}];
+  std::vector<LooseContacts> out;
+  for (const auto& [pair, count] : counts) out.push_back({pair.first, pair.second, count});
+  std::stable_sort(out.begin(), out.end(),
+                   [](const auto& one, const auto& other) { return one.count > other.count; });
+  return out;
+}
+
+// (N,) the blocks of selected cells: joined by firm contacts, and by others unless both parts hold a large
+// block.
+Array<std::int32_t, 1> blocks_of(View<const std::int32_t, 2> neighbours, View<const bool, 1> selected,
+                                 const GapCheckLimits& limits) {
+  Array<std::int32_t, 1> block = connected_components(firm_contacts(neighbours), selected);
+  const Array<std::int64_t, 1> sizes = block_sizes(block);
+  const auto total = static_cast<double>(std::count(selected.begin(), selected.end(), true));
+  const double large = std::max(static_cast<double>(limits.min_block_cells), limits.min_block_share * total);
+  Array<std::int32_t, 1> parent({sizes.size()}), number({sizes.size()}, -1);
+  Array<bool, 1> is_large({sizes.size()});
+  for (Index b = 0; b < sizes.size(); ++b) {
+    parent[b] = static_cast<std::int32_t>(b);
+    is_large[b] = static_cast<double>(sizes[b]) >= large;
+  }
+  for (const LooseContacts& one : loose_contacts(neighbours, block)) {
+    const std::int32_t a = root_of(parent, one.a), b = root_of(parent, one.b);
+    if (a == b || (is_large[a] && is_large[b])) continue;
+    parent[a] = b;
+    is_large[b] = is_large[a] || is_large[b];
+  }
+  std::int32_t count = 0;
+  for (std::int32_t& own : block.view()) {
+    if (own < 0) continue;
+    const std::int32_t root = root_of(parent, own);
+    if (number[root] < 0) number[root] = count++;
+    own = number[root];
+  }
+  return block;
 }
 
 }  // namespace
@@ -251,7 +331,7 @@ Array<bool, 1> consistent_cells(const Contacts& contacts, View<const std::int32_
   const auto center = contacts.cells.center_px;
   Array<bool, 1> selected({count});
   for (Index i = 0; i < count; ++i) selected[i] = contacts.cells.is_intact[i] && cell[i] >= 0;
-  const Array<std::int32_t, 1> block = connected_components(neighbours, selected);
+  const Array<std::int32_t, 1> block = blocks_of(neighbours, selected, limits);
   Array<std::int64_t, 1> sizes = block_sizes(block);
   if (sizes.size() == 0) return Array<bool, 1>({count}, false);
   const Index largest = std::max_element(sizes.begin(), sizes.end()) - sizes.begin();

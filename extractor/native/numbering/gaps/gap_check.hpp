@@ -16,6 +16,8 @@ struct GapCheckLimits {
   double max_median_jump, max_jump_share, max_single_jump, max_gap, max_gap_ratio, min_slope_spread;
   Index reference_candidates, white_cell_neighbours, min_white_cell_neighbours;
   double max_white_cell_misfit;
+  Index min_block_cells;
+  double min_block_share;
   CornerContactLimits contact;
 
   template <class F>
@@ -30,6 +32,8 @@ struct GapCheckLimits {
             f["white_cell_neighbours"],
             f["min_white_cell_neighbours"],
             f["max_white_cell_misfit"],
+            f["min_block_cells"],
+            f["min_block_share"],
             f["contact"]};
   }
 };

@@ -1,4 +1,4 @@
-// Room "measure" as Python sees it.
+// Room "measure" for Python.
 #include "base/binding.hpp"
 
 #include "refine/measure/gridline_bending.hpp"

@@ -20,9 +20,9 @@ struct OffsetLimits {
 // The gridlines and the levels beside them, where refinement last compared the image with the pattern.
 struct GridlineReading {
   View<const double, 2> lines;      // (E, 8), as gridlines gives them
-  View<const double, 2> sides;      // (E, 6), the light on both sides, as gridline_sides gives it
+  View<const double, 2> sides;      // (E, 6), the light on both sides, as GridlineSides gives it
   View<const double, 2> added;      // (E, 6), the light to add to the drawing; the sides where none was drawn
-  View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it; used where nothing was drawn
+  View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it; used where no pattern was drawn
   View<const double, 1> weight;     // (E,) 0 to 1
   View<const double, 1> variance_ratio;   // (E,), as variance_ratios gives it
   View<const double, 1> dot_gain_offset;  // (E,) px, the shift of the gridline towards (-uy, ux) by dot gain
@@ -39,7 +39,7 @@ struct GridlineReading {
 
 // The offsets of the gridlines around their virtual markers, count of each gridline.
 //
-// model (H, W, 3), the light of the drawn pattern; empty where nothing was drawn.
+// model (H, W, 3), the light of the drawn pattern; empty where no pattern was drawn.
 // (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain; px^2, its variance. NaN where the
 // gridline has no contrast or little weight or leaves the image, or where another gridline is near what was
 // not drawn.

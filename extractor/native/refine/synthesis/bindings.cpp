@@ -1,4 +1,4 @@
-// Room "synthesis" as Python sees it.
+// Room "synthesis" for Python.
 #include "base/binding.hpp"
 
 #include "refine/synthesis/blur_bleed.hpp"

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/processor.hpp"
 #include "refine/synthesis/gridlines.hpp"
 
 namespace cmp::refine {
@@ -37,8 +38,8 @@ double corner_cosine(const CellSide& one, const CellSide& other, double sigma) {
 // Fills in the distances of the pixels inside a side, in units of the blur.
 //
 // (x0, y0) px is the origin of the pixels' places. Beyond `far` the distance is that from the chord.
-void fill_distances(Index k, Index count, double x0, double y0, const CellOutline& outline,
-                    CellPixels& pixels) {
+CMP_PART_OF_LOOP void fill_distances(Index k, Index count, double x0, double y0, const CellOutline& outline,
+                                     CellPixels& pixels) {
   const CellSide& side = outline.sides[k];
   CellColumn& out = pixels.distance[k];
   const auto limit = static_cast<float>(outline.far);
@@ -82,7 +83,7 @@ inline float wedge_share(float d, float other, const numeric::CornerTerms& corne
 
 // Replaces the distances inside the three sides by the least, the middle and the largest, and fills in the
 // corner between the two sides of the first two.
-void sort_distances(Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void sort_distances(Index count, CellPixels& pixels) {
   auto& distance = pixels.distance;
   for (Index k = 0; k < count; ++k) {
     const float d0 = distance[0][k], d1 = distance[1][k], d2 = distance[2][k];
@@ -98,7 +99,7 @@ void sort_distances(Index count, CellPixels& pixels) {
 //
 // Short loops one after the other: in a long one the processor waits, and the compiler entangles the
 // conditions.
-void fill_two_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void fill_two_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
   const auto [c01, c12, c20] = outline.corners;
   const auto &nearest = pixels.distance[0], &next = pixels.distance[1];
   sort_distances(count, pixels);
@@ -120,14 +121,14 @@ void fill_two_side_coverage(const CellOutline& outline, Index count, CellPixels&
 }
 
 // Adds the shares of the wedge between the sides k and k + 1 less the products of these sides' shares.
-void add_wedge(Index k, const CellOutline& outline, Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void add_wedge(Index k, const CellOutline& outline, Index count, CellPixels& pixels) {
   const numeric::CornerTerms corner = outline.corners[k];
   const auto &one = pixels.distance[k], &other = pixels.distance[(k + 1) % 3];
   for (Index i = 0; i < count; ++i) pixels.wedge[i] += wedge_share(one[i], other[i], corner);
 }
 
 // Fills in the shares of the pixels of any cell.
-void fill_three_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void fill_three_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
   const auto& distance = pixels.distance;
   std::fill_n(pixels.wedge.begin(), count, 0.0F);
   for (Index k = 0; k < 3; ++k) add_wedge(k, outline, count, pixels);
@@ -150,6 +151,17 @@ bool is_small(const std::array<CellSide, 3>& sides) {
   const double square =
       (perimeter - 2.0 * a) * (perimeter - 2.0 * b) * (perimeter - 2.0 * c) / (4.0 * perimeter);
   return square < (numeric::NORMAL_REACH + bow) * (numeric::NORMAL_REACH + bow);
+}
+
+// Fills in the shares of a cell in pixels; see fill_coverage.
+void fill_shares(Index count, double x0, double y0, const CellOutline& outline, CellPixels& pixels) {
+  const Index padded = padded_count(count);
+  for (Index k = 0; k < 3; ++k) fill_distances(k, padded, x0, y0, outline, pixels);
+  if (is_small(outline.sides)) {
+    fill_three_side_coverage(outline, padded, pixels);
+  } else {
+    fill_two_side_coverage(outline, padded, pixels);
+  }
 }
 
 }  // namespace
@@ -195,13 +207,7 @@ void fill_row_ends(const CellOutline& outline, double top, Index count, const Ro
 }
 
 void fill_coverage(Index count, double x0, double y0, const CellOutline& outline, CellPixels& pixels) {
-  const Index padded = padded_count(count);
-  for (Index k = 0; k < 3; ++k) fill_distances(k, padded, x0, y0, outline, pixels);
-  if (is_small(outline.sides)) {
-    fill_three_side_coverage(outline, padded, pixels);
-  } else {
-    fill_two_side_coverage(outline, padded, pixels);
-  }
+  run_loop<fill_shares>(count, x0, y0, outline, pixels);
 }
 
 }  // namespace cmp::refine

@@ -27,19 +27,19 @@ Point cell_centroid(View<const double, 2> xy, View<const std::int32_t, 1> cell) 
 
 }  // namespace
 
-Array<double, 2> gridline_sides(View<double, 2> lines, View<const double, 2> xy,
-                                View<const std::int32_t, 2> cells, View<const std::int32_t, 2> edge_cells,
-                                const InkLevels& levels, const image::PolynomialFrame& frame) {
-  Array<double, 2> sides({lines.size(), SIDE_COLUMNS}, 0.0);
-  const auto out = sides.view();
-  const auto cell = levels.cell;
-  const auto slope = levels.slope;
-  for (Index e = 0; e < lines.size(); ++e) {
+GridlineSides::GridlineSides(View<double, 2> lines, View<const double, 2> xy,
+                             View<const std::int32_t, 2> cells, View<const std::int32_t, 2> edge_cells,
+                             const image::PolynomialFrame& frame)
+    : count_(lines.size()) {
+  known_.reserve(static_cast<std::size_t>(count_));
+  for (Index e = 0; e < count_; ++e) {
     const auto line = lines[e];
     if (line[KNOWN] == 0.0) continue;
     const auto [mx, my] = chord_middle(line);
-    for (Index k = 0; k < 2; ++k) {
+    KnownGridline own{e, {}, monomials((mx - frame.x) / frame.scale, (my - frame.y) / frame.scale)};
+    for (std::size_t k = 0; k < 2; ++k) {
       const Index i = edge_cells(e, k);
+      own.neighbours[k].cell = i;
       if (i < 0) continue;
       const auto [cx, cy] = cell_centroid(xy, cells[i]);
       if (!std::isfinite(cx)) {
@@ -48,31 +48,43 @@ Array<double, 2> gridline_sides(View<double, 2> lines, View<const double, 2> xy,
         break;
       }
       const Index side = (cy - my) * line[UX] - (cx - mx) * line[UY] > 0.0 ? BEYOND : BEFORE;
+      own.neighbours[k] = {i, side, mx - cx, my - cy};
+    }
+    if (line[KNOWN] != 0.0) known_.push_back(own);
+  }
+}
+
+Array<double, 2> GridlineSides::light(const InkLevels& levels) const {
+  Array<double, 2> sides({count_, SIDE_COLUMNS}, 0.0);
+  const auto out = sides.view();
+  const auto cell = levels.cell;
+  const auto slope = levels.slope;
+  for (const KnownGridline& line : known_) {
+    for (const auto& [i, side, x, y] : line.neighbours) {
+      if (i < 0) continue;
       for (Index channel = 0; channel < 3; ++channel) {
-        const double rise = slope(i, channel, 0) * (mx - cx) + slope(i, channel, 1) * (my - cy);
-        out(e, side + channel) += cell(i, channel) + rise;
+        const double rise = slope(i, channel, 0) * x + slope(i, channel, 1) * y;
+        out(line.edge, side + channel) += cell(i, channel) + rise;
       }
     }
-    if (line[KNOWN] == 0.0) out[e].fill(0.0);
   }
-  add_black(out, lines, levels.black, frame);
+  add_black(out, levels.black);
   return sides;
 }
 
-void add_black(View<double, 2> sides, View<const double, 2> lines, View<const double, 2> black,
-               const image::PolynomialFrame& frame) {
-  for (Index e = 0; e < lines.size(); ++e) {
-    const auto line = lines[e];
-    if (line[KNOWN] == 0.0) continue;
-    const auto [mx, my] = chord_middle(line);
-    const Monomials terms = monomials((mx - frame.x) / frame.scale, (my - frame.y) / frame.scale);
+void GridlineSides::add_black(View<double, 2> sides, View<const double, 2> black) const {
+  std::array<std::array<double, 3>, POLYNOMIAL_TERMS> factors;
+  for (Index k = 0; k < POLYNOMIAL_TERMS; ++k) factors[k] = {black(0, k), black(1, k), black(2, k)};
+  for (const KnownGridline& line : known_) {
     std::array<double, 3> level{};
-    for (Index k = 0; k < POLYNOMIAL_TERMS; ++k) {
-      for (Index channel = 0; channel < 3; ++channel) level[channel] += terms[k] * black(channel, k);
+    for (std::size_t k = 0; k < factors.size(); ++k) {
+      for (std::size_t channel = 0; channel < 3; ++channel)
+        level[channel] += line.terms[k] * factors[k][channel];
     }
+    const auto own = sides[line.edge];
     for (Index channel = 0; channel < 3; ++channel) {
-      sides(e, BEFORE + channel) += level[channel];
-      sides(e, BEYOND + channel) += level[channel];
+      own[BEFORE + channel] += level[channel];
+      own[BEYOND + channel] += level[channel];
     }
   }
 }

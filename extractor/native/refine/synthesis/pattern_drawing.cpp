@@ -57,7 +57,7 @@ class CellDrawing {
         flat_(model.flat()),
         low_({model.size() + PIXEL_LANES}),
         high_({model.size() + PIXEL_LANES}),
-        pixels_(std::make_unique<CellPixels>()) {}
+        pixels_(new CellPixels) {}
 
   void draw(Index i) {
     const auto cell = geometry_.cells[i];

@@ -1,5 +1,6 @@
 #include "refine/synthesis/pixel_rows.hpp"
 
+#include "base/processor.hpp"
 #include "image/response.hpp"
 
 namespace cmp::refine {
@@ -50,9 +51,9 @@ void fill_drawn(View<const float, 1> encoded, const RowBlock& block, Residuals& 
   }
 }
 
-}  // namespace
-
-void fill_rows(const RowBlock& block, Index first, const RowFrame& frame, double half, BlockRows& rows) {
+// Fills in the columns of the rows; see fill_rows.
+void fill_row_columns(const RowBlock& block, Index first, const RowFrame& frame, double half,
+                      BlockRows& rows) {
   const double p0 = frame.p, q0 = frame.q, up = frame.up, uq = frame.uq, sense = frame.sense;
   const double leave = frame.leave, arrive = frame.arrive;
   const double lean = uq / up, per_length = 1.0 / (up * frame.length), bulge = sense * frame.length / up;
@@ -76,6 +77,12 @@ void fill_rows(const RowBlock& block, Index first, const RowFrame& frame, double
     rows.from[i] = static_cast<float>(start - base);
     rows.to[i] = i >= count ? -1.0F : static_cast<float>(stop - base);
   }
+}
+
+}  // namespace
+
+void fill_rows(const RowBlock& block, Index first, const RowFrame& frame, double half, BlockRows& rows) {
+  run_loop<fill_row_columns>(block, first, frame, half, rows);
 }
 
 void fill_values(const ComparedImages& images, const RowBlock& block, const BlockRows& rows,

@@ -1,5 +1,7 @@
 #include "refine/synthesis/pixel_weights.hpp"
 
+#include "base/processor.hpp"
+
 namespace cmp::refine {
 
 namespace {
@@ -38,9 +40,8 @@ inline WeightParts weight_parts(float along, float across, const PixelGeometry& 
   return {z, g, inner - to_b, to_b};
 }
 
-}  // namespace
-
-void fill_weights(const RowBlock& block, const PixelGeometry& geometry, const WeightReach& weight_reach,
+// Fills in the columns of the weights; see fill_weights.
+void fill_columns(const RowBlock& block, const PixelGeometry& geometry, const WeightReach& weight_reach,
                   GridlinePixels& pixels) {
   const BlockRows& rows = pixels.rows;
   PixelWeights& out = pixels.weights;
@@ -67,6 +68,13 @@ void fill_weights(const RowBlock& block, const PixelGeometry& geometry, const We
       out.before_share[at + i] = half_share(parts.z);
     }
   }
+}
+
+}  // namespace
+
+void fill_weights(const RowBlock& block, const PixelGeometry& line, const WeightReach& reach,
+                  GridlinePixels& pixels) {
+  run_loop<fill_columns>(block, line, reach, pixels);
 }
 
 }  // namespace cmp::refine

@@ -8,6 +8,13 @@ namespace cmp::refine {
 
 namespace {
 
+// The thread's memory for the pixels of a gridline: to write zeros to fresh memory takes longer than to reuse
+// it. Rows that fill up the lanes keep numbers of earlier gridlines, with the weight 0.
+GridlinePixels& kept_pixels() {
+  static thread_local const auto pixels = std::make_unique<GridlinePixels>();
+  return *pixels;
+}
+
 // Adds the pixels of gridlines to their sums.
 class ResidualReader {
  public:
@@ -18,7 +25,7 @@ class ResidualReader {
         width_(view.image.size(1)),
         sigma_(sigma),
         reach_(limits.band * sigma),
-        pixels_(std::make_unique<GridlinePixels>()) {
+        pixels_(kept_pixels()) {
     const Index start = 3 * (area_.y_from * width_ + area_.x_from);
     images_ = {view.image.flat().from(start), model.flat().from(start), view.response.encoded};
   }
@@ -39,12 +46,12 @@ class ResidualReader {
     const RowSizes sizes = row_sizes(half, frame.q_count);
     for (Index first = begin; first <= last; first += sizes.most) {
       const RowBlock block{std::min(sizes.most, last + 1 - first), sizes.wide, frame.step_q};
-      fill_rows(block, first, frame, half, pixels_->rows);
-      fill_weights(block, line, weights, *pixels_);
-      fill_values(images_, block, pixels_->rows, light, pixels_->weights.before_share, pixels_->residuals);
-      fill_projections(light, bleed, block.pixels(), *pixels_);
-      accumulate_sums(*pixels_, block.pixels(), sums);
-      if (drawn_.is_bending[e]) accumulate_bending_sums(*pixels_, block.pixels(), sums);
+      fill_rows(block, first, frame, half, pixels_.rows);
+      fill_weights(block, line, weights, pixels_);
+      fill_values(images_, block, pixels_.rows, light, pixels_.weights.before_share, pixels_.residuals);
+      fill_projections(light, bleed, block.pixels(), pixels_);
+      accumulate_sums(pixels_, block.pixels(), sums);
+      if (drawn_.is_bending[e]) accumulate_bending_sums(pixels_, block.pixels(), sums);
     }
     update_units(sums, 1.0 / sigma_);
   }
@@ -63,7 +70,7 @@ class ResidualReader {
   Index width_;
   double sigma_, reach_;  // px
   ComparedImages images_;
-  std::unique_ptr<GridlinePixels> pixels_;
+  GridlinePixels& pixels_;
 };
 
 }  // namespace

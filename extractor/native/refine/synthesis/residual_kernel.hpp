@@ -23,7 +23,7 @@ inline constexpr Index SUMS = 24;
 // Gridlines as they are drawn.
 struct DrawnGridlines {
   View<const double, 2> lines;     // (E, 8), as gridlines gives them
-  View<const double, 2> sides;     // (E, 6), the light on both sides, as gridline_sides gives it
+  View<const double, 2> sides;     // (E, 6), the light on both sides, as GridlineSides gives it
   View<const double, 2> added;     // (E, 6), the light to add: the black, and the change of the levels since
   View<const double, 2> bleed;     // (E, 6), the change of the light where the blur grows by its own width
   View<const bool, 1> is_bending;  // (E,), gridlines with two more unknowns for their bending

@@ -1,5 +1,6 @@
 #include "refine/synthesis/residual_sums.hpp"
 
+#include "base/processor.hpp"
 #include "refine/synthesis/residual_kernel.hpp"
 
 namespace cmp::refine {
@@ -9,9 +10,9 @@ namespace {
 constexpr float FULL_DENSITY =
     2.5066283F;  // the root of 2 pi, by which the normal density is 1 on the gridline
 
-}  // namespace
-
-void fill_projections(const SideLight& light, const SideLight& bleed, Index count, GridlinePixels& pixels) {
+// Fills in the columns of the residuals; see fill_projections.
+void fill_residual_columns(const SideLight& light, const SideLight& bleed, Index count,
+                           GridlinePixels& pixels) {
   const float contrast0 = light.contrast[0], contrast1 = light.contrast[1], contrast2 = light.contrast[2];
   const float step0 = bleed.step[0], step1 = bleed.step[1], step2 = bleed.step[2];
   const float beyond0 = bleed.beyond[0], beyond1 = bleed.beyond[1], beyond2 = bleed.beyond[2];
@@ -31,6 +32,12 @@ void fill_projections(const SideLight& light, const SideLight& bleed, Index coun
     pixels.bleed_cross[k] = b0 * d0 + b1 * d1 + b2 * d2;
     pixels.bleed_square[k] = b0 * b0 + b1 * b1 + b2 * b2;
   }
+}
+
+}  // namespace
+
+void fill_projections(const SideLight& light, const SideLight& bleed, Index count, GridlinePixels& pixels) {
+  run_loop<fill_residual_columns>(light, bleed, count, pixels);
 }
 
 void accumulate_sums(const GridlinePixels& pixels, Index count, View<double, 1> sums) {

@@ -1,4 +1,4 @@
-"""Print sheets: what is on them, true to size, and how a scan of one is read."""
+"""Print sheets: their content, true to size, and the reading of a scan."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_keys_survive_odd_names() -> None:
 
 
 def leaning(image: Pixels, tilt_deg: float, away_mm: float = 400.0) -> Pixels:
-    """The sheet as a camera sees it that looks at its middle from aside."""
+    """The sheet in the picture of a camera that looks at the sheet's middle from the side."""
     height, width = image.shape[:2]
     away, tilt = away_mm / 25.4 * DPI, np.radians(tilt_deg)
     x, y = np.array([(0, 0), (width, 0), (width, height), (0, height)], dtype=float).T
@@ -154,7 +154,7 @@ def test_files_state_their_resolution(kind: str, tmp_path: Path) -> None:
     assert resolution_dpi(saved(blank, tmp_path / f"a.{kind}", dpi=(300, 150))) == pytest.approx(
         (300, 150), abs=0.02
     )
-    assert "dpi, which programs write" in str(
+    assert "dpi, the default of programs" in str(
         resolution_dpi(saved(blank, tmp_path / f"b.{kind}", dpi=(72, 72)))
     )
     assert isinstance(resolution_dpi(saved(blank, tmp_path / f"c.{kind}")), str)
@@ -167,7 +167,7 @@ def test_files_without_a_resolution_of_their_own_say_why(tmp_path: Path) -> None
     exif = Image.Exif()
     exif.get_ifd(0x8769)[0x829A] = 0.01
     photo = saved(blank, tmp_path / "photo.jpg", dpi=(300, 300), exif=exif)
-    assert "a photo's resolution tag" in str(resolution_dpi(photo))
+    assert "the resolution tag of a photo" in str(resolution_dpi(photo))
     assert "states no resolution" in str(resolution_dpi(saved(blank, tmp_path / "plain.png")))
     (tmp_path / "broken.png").write_bytes(b"nothing")
     assert "cannot be read" in str(resolution_dpi(tmp_path / "broken.png"))

@@ -1,0 +1,81 @@
+"""What the trials found, as docs/measured/ablation.json and as tables: a row for each rule that was ever tried."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from benchmarks.suites.ablation.comparison import Comparison
+from benchmarks.suites.ablation.rules import BY_NAME
+from benchmarks.support.published import MEASURED_FOLDER, read_measured, write_published
+
+NAME = "ablation"
+JUDGED = ("wrong", "lost", "rms_px", "typical_px", "departure", "beyond", "ms")
+
+
+def comparison_row(found: Comparison) -> dict[str, Any]:
+    """The figures of a rule as they are written."""
+    changes = {name: getattr(found, name)._asdict() for name in JUDGED}
+    named = {"rule": found.rule.name, "stage": found.rule.stage, "kind": found.rule.kind}
+    return {**found._asdict(), **changes, **named, "verdict": found.verdict}
+
+
+def publish(rows: Iterable[Mapping[str, Any]], command: str) -> list[Path]:
+    """Put the rows beside those of the rules that were tried earlier. Returns the written files."""
+    earlier = read_measured(NAME)["rows"] if (MEASURED_FOLDER / f"{NAME}.json").exists() else []
+    kept = {row["rule"]: row for row in earlier}
+    for row in rows:
+        kept.pop(row["rule"], None)
+        kept[row["rule"]] = {**row, "command": command}
+    measured = {"rows": list(kept.values())}
+    return write_published(NAME, measured, documentation_blocks(measured))
+
+
+def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
+    """The tables of docs/explanation/rules.md from the content of docs/measured/ablation.json."""
+    rows = measured["rows"]
+    lines = [
+        "| rule | of | pictures | changed | wrong ids | wrong positions | lost, % | RMS, % | typical RMS, % "
+        "| by the figures | rule |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+        *(_line(row) for row in rows),
+    ]
+    timed = [row for row in rows if row["kind"] == "errors and time" and "beyond" in row]
+    more = [
+        "| rule | z | beyond three deviations, % | processor time |",
+        "|---|---|---|---|",
+        *(
+            f"| {row['rule']} | {row['z'][0]:.2f} > {row['z'][1]:.2f} "
+            f"| {100 * row['beyond']['full']:.2f} > {100 * row['beyond']['without']:.2f} "
+            f"| {row['time_ratio']:.2f} |"
+            for row in timed
+        ),
+    ]
+    commands = dict.fromkeys(row["command"] for row in rows)
+    written = ["Written by", *(f"`{command}`" for command in commands)]
+    return {NAME: "\n".join([*lines, "", *more, "", "\n".join(written)])}
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    fate = "stays" if row["rule"] in BY_NAME else "deleted"
+    counts = (f"{before} > {after}" for before, after in (row["wrong_ids"], row["wrong_positions"]))
+    shares = (_share(row[name]) for name in ("lost", "rms_px", "typical_px"))
+    cells = (
+        row["rule"],
+        row["stage"],
+        row["pictures"],
+        row["touched"],
+        *counts,
+        *shares,
+        row["verdict"],
+        fate,
+    )
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+def _share(change: Mapping[str, float]) -> str:
+    """The difference and its interval, in percent of the figure with the rule."""
+    unit = 100 / change["full"]
+    difference = unit * (change["without"] - change["full"])
+    return f"{difference:+.1f} [{unit * change['low']:+.1f}, {unit * change['high']:+.1f}]"

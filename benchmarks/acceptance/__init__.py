@@ -1,0 +1,1 @@
+"""``python -m benchmarks.acceptance``: wrong positions against lost markers, over the threshold of acceptance."""

@@ -1,0 +1,117 @@
+"""The curve as a table for the terminal and the documentation, and as a picture."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from benchmarks.acceptance.points import MOST_LOST, MOST_WRONG, Point
+from benchmarks.support.published import read_measured
+
+NAME, IMAGE = "acceptance", "acceptance.png"
+BLUE, GREY = "#0072b2", "#444444"
+
+
+def curve_table(points: Sequence[Point], own: Point) -> Table:
+    """A row for each threshold."""
+    table = Table(
+        title="Wrong positions against lost markers",
+        box=SIMPLE_HEAD,
+        title_justify="left",
+        pad_edge=False,
+    )
+    for name in (
+        "threshold",
+        "reported",
+        "wrong ids",
+        "wrong",
+        "per million",
+        "95 % below",
+        "lost",
+        "of today's",
+    ):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for one in points:
+        table.add_row(
+            f"{one.threshold:g}",
+            f"{one.reported:,}",
+            str(one.wrong_ids),
+            str(one.wrong_positions),
+            f"{one.wrong_per_million:.1f}",
+            f"{one.upper_per_million:.1f}",
+            f"{one.lost:,}",
+            f"{one.lost / own.lost:.3f}",
+            "holds" if one.holds(own) else "",
+        )
+    return table
+
+
+def own_point(measured: Mapping[str, Any]) -> Point:
+    """The point of the reader's own threshold."""
+    return next(one for one in measured_points(measured) if one.threshold == measured["own"])
+
+
+def measured_points(measured: Mapping[str, Any]) -> list[Point]:
+    """The points of the content of docs/measured/acceptance.json."""
+    return [Point(**entry) for entry in measured["points"]]
+
+
+def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
+    """The part of the documentation from the content of docs/measured/acceptance.json."""
+    points, own = measured_points(measured), own_point(measured)
+    rows = [
+        f"![Wrong positions against lost markers](../images/{IMAGE})",
+        "",
+        "| threshold, edges | reported | wrong ids | wrong positions | per million | 95 % below | lost | of today's |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    rows += [
+        f"| {one.threshold:g}{' (today)' if one.threshold == own.threshold else ''} | {one.reported:,} "
+        f"| {one.wrong_ids} | {one.wrong_positions} | {one.wrong_per_million:.1f} | {one.upper_per_million:.1f} "
+        f"| {one.lost:,} | {one.lost / own.lost:.3f} |"
+        for one in points
+    ]
+    rows += ["", f"Written by `{measured['command']}`: {measured['pictures']:,} pictures."]
+    return {NAME: "\n".join(rows)}
+
+
+def figures() -> dict[str, bytes]:
+    """Name in docs/images -> PNG, from docs/measured/acceptance.json."""
+    return {IMAGE: curve_picture(read_measured(NAME))}
+
+
+def curve_picture(measured: Mapping[str, Any]) -> bytes:
+    """PNG: over the threshold, wrong positions a million with their upper bounds, and lost markers over today's."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    points, own = measured_points(measured), own_point(measured)
+    at = [one.threshold for one in points]
+    share = [one.wrong_per_million for one in points]
+    above = [one.upper_per_million - one.wrong_per_million for one in points]
+    figure, (wrong, lost) = pyplot.subplots(2, 1, sharex=True, figsize=(7.2, 4.4))
+    wrong.errorbar(at, share, yerr=[[0.0] * len(above), above], fmt="o", color=BLUE, capsize=4, markersize=5)
+    wrong.axhline(MOST_WRONG, color=GREY, linestyle="--", linewidth=1)
+    wrong.set(ylabel="wrong a million,\n95 % below", ylim=(0, 1.2 * MOST_WRONG))
+    lost.plot(at, [one.lost / own.lost for one in points], "o-", color=BLUE, markersize=5)
+    lost.axhline(MOST_LOST, color=GREY, linestyle="--", linewidth=1)
+    lost.set(
+        xscale="log", xlabel="threshold, edges; the reader's own is dotted", ylabel="lost,\nover today's"
+    )
+    lost.set_xticks(at, [f"{value:g}" for value in at])
+    lost.minorticks_off()
+    for axis in (wrong, lost):
+        axis.axvline(own.threshold, color=GREY, linestyle=":", linewidth=1)
+        axis.grid(alpha=0.25)
+    figure.tight_layout()
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=100, metadata={"Software": None})
+    pyplot.close(figure)
+    return data.getvalue()
