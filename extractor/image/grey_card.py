@@ -37,7 +37,7 @@ class GreyCardLimits(NamedTuple):
     sigma_share: float = 0.15
     half_weight_share: float = 0.2
     rest_weight_share: float = 0.02
-    white_ratio: float = 1.6
+    white_ratio: float = 1.45
     ink_ratio: float = 1.28
     min_level: float = 1.5
     max_gain: float = 12.0
