@@ -10,7 +10,7 @@ import json
 import re
 import shlex
 import sys
-from importlib.metadata import PackageNotFoundError, distribution, requires
+from importlib.metadata import PackageNotFoundError, distribution, requires, version
 from importlib.util import find_spec
 from types import TracebackType
 from urllib.parse import urlparse
@@ -36,10 +36,17 @@ EXTRAS = {
 _DISTRIBUTIONS = {
     "OCP": "cadquery-ocp-novtk",
     "PIL": "pillow",
-    "cv2": "opencv-contrib-python-headless",
+    "cv2": "opencv-python-headless",
     "foxglove": "foxglove-sdk",
     "rerun": "rerun-sdk",
 }
+# Distributions that bring OpenCV; the first is required. Each suffices; two in one environment overwrite each other.
+OPENCV_DISTRIBUTIONS = (
+    "opencv-python-headless",
+    "opencv-contrib-python-headless",
+    "opencv-python",
+    "opencv-contrib-python",
+)
 _OWN = ("cmpdesign", "extractor")
 
 
@@ -94,6 +101,16 @@ def install_command(name: str) -> str:
     wanted = f"{source}[{name}]"
     quoted = f'"{wanted}"' if sys.platform == "win32" else shlex.quote(wanted)
     return f"pip install {options}{quoted}"
+
+
+def opencv_version() -> str:
+    """Version of the installed distribution that brings OpenCV, of ``OPENCV_DISTRIBUTIONS``; "unknown" if none is."""
+    for name in OPENCV_DISTRIBUTIONS:
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            continue
+    return "unknown"
 
 
 def missing_library_text(error: ModuleNotFoundError) -> str | None:

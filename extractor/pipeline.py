@@ -1,7 +1,7 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
-Stages: image, color, target, segment, seeds, grow, triangles, cells, mesh, number, attach, place, refine, repair,
-virtual, quality. A warm start of the tracker goes from image over predict and prove to refine.
+Stages: image, light, color, target, segment, seeds, grow, triangles, cells, mesh, number, attach, place, refine,
+repair, virtual, quality. A warm start of the tracker goes from image over predict and prove to refine.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from extractor.complete.reported_share import is_less_than_half_reported
 from extractor.complete.virtual_markers import locate_virtual_markers
 from extractor.errors import LayoutError
 from extractor.image.color import nominal_hues_deg, to_colors
+from extractor.image.grey_card import GreyCard, find_grey_card, remove_light_color
 from extractor.image.ink_segmentation import segment
 from extractor.image.input import Channels, convert_to_bgr
 from extractor.image.pyramid import Pyramid
@@ -199,7 +200,9 @@ class Extractor:
         pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Unnumbered):
-            quality = stages.record("quality", measure_quality_without_numbers(pyramid.level(1), found.cells))
+            has_pattern = found.reason not in (Reason.NO_COLOR, Reason.NO_PATTERN)
+            quality = measure_quality_without_numbers(pyramid.level(1), found.cells, has_pattern)
+            stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.reason, stages, quality), None)
         cells, numbering = found.cells, found.numbering
         places = stages.record("place", merge_corners(cells, numbering, self._lattice))
@@ -252,16 +255,22 @@ class Extractor:
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
         """Stages 1 to 7 at the coarsest scale that numbers cells; else the reason at the finest scale."""
         failed = Unnumbered(Reason.NO_COLOR)
-        for scale in _recognition_scales(pyramid.size):
-            found = self._number_cells_at(pyramid, scale, stages)
+        scales = _recognition_scales(pyramid.size)
+        card = stages.record("light", find_grey_card(pyramid.level(scales[0]).image, scales[0]))
+        for scale in scales:
+            found = self._number_cells_at(pyramid, card, scale, stages)
             if not isinstance(found, Unnumbered):
                 return found
             failed = found
         return failed
 
-    def _number_cells_at(self, pyramid: Pyramid, scale: int, stages: Stages) -> NumberedCells | Unnumbered:
+    def _number_cells_at(
+        self, pyramid: Pyramid, card: GreyCard, scale: int, stages: Stages
+    ) -> NumberedCells | Unnumbered:
         """Stages 1 to 7 at 1/``scale`` of the full scale, or the reason why no cells are numbered."""
-        colors = stages.record("color", to_colors(pyramid.level(scale).image))
+        colors = stages.record(
+            "color", to_colors(remove_light_color(pyramid.level(scale).image, card, scale))
+        )
         target = stages.record("target", find_target(colors))
         segmentation = stages.record("segment", segment(colors, target, self._nominal_hues_deg))
         if segmentation is None:

@@ -1,4 +1,4 @@
-"""What pytest hands to the tests of every folder."""
+"""Fixtures for the tests of every folder."""
 
 from __future__ import annotations
 

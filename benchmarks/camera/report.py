@@ -11,10 +11,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.suites.camera.cases import KINDS
+from benchmarks.suites.camera.effects import COLOR_EFFECTS
 from benchmarks.suites.camera.reading import LOST, UNSEEN, PictureResult
 from benchmarks.suites.scoring.calibration import Calibration, summarise
 
 TOGETHER = "together"
+LEAST_CONTRAST, LEAST_PITCH_PX = 20.0, 8.0  # from which on neighbouring cells are separable
+COLORS_SEPARABLE, ALL_SEPARABLE = "colors, CIE76 20", "together, CIE76 20"
 NO_REASON = "no reason given"
 MOST_FAILURES = 40  # listed pictures
 
@@ -86,14 +89,27 @@ def effect_row(effect: str, results: Sequence[PictureResult]) -> EffectRow:
     )
 
 
+def is_separable(result: PictureResult) -> bool:
+    """Neighbouring cells differ by a CIE76 of 20 (5th percentile over the pattern), and the pitch is 8 px or more."""
+    return result.contrast >= LEAST_CONTRAST and result.pitch_px >= LEAST_PITCH_PX
+
+
+def separable_rows(results: Sequence[PictureResult]) -> list[EffectRow]:
+    """The separable pictures of the effects of light and inks, and those of all effects."""
+    separable = [result for result in results if is_separable(result)]
+    colored = [result for result in separable if result.case.kind in COLOR_EFFECTS]
+    named = ((COLORS_SEPARABLE, colored), (ALL_SEPARABLE, separable))
+    return [effect_row(name, chosen) for name, chosen in named if chosen]
+
+
 def effect_rows(results: Sequence[PictureResult]) -> list[EffectRow]:
-    """One row per effect in the order of a camera, and one of all pictures."""
+    """One row per effect in the order of a camera, of separable pictures, and of all pictures."""
     rows = []
     for kind in KINDS:
         of_kind = [result for result in results if result.case.kind == kind]
         if of_kind:
             rows.append(effect_row(kind, of_kind))
-    return [*rows, effect_row(TOGETHER, results)]
+    return [*rows, *separable_rows(results), effect_row(TOGETHER, results)]
 
 
 def graded_rows(results: Sequence[PictureResult]) -> list[EffectRow]:

@@ -9,7 +9,8 @@ similar.
 Columns: the share of visible markers measured; wrong ids (reported at another marker's place) and wrong positions
 (error above 0.3 of the shortest edge); RMS error per axis of measured markers that are not wrong; z, median z and the
 share beyond of all measured markers, wrong ones included, with its interval; processor time of one picture, the
-faster of two readings.
+faster of two readings. Rows with "CIE76 20" are of pictures in which neighbouring cells differ by as much (5th
+percentile over the pattern) at a pitch of 8 px or more: those of the effects of light and inks, and those of all.
 """
 
 from __future__ import annotations

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from cmpdesign.files.atomic import write_file
+from cmpdesign.libraries import opencv_version
 
-PACKAGES = ("numpy", "opencv-contrib-python-headless", "scipy")
+PACKAGES = ("numpy", "opencv", "scipy")
 NATIVE_MODULE = "extractor._native"
 COMPILER_NOTE = re.compile(rb"(clang) version (\d+[.\d]*)|(GCC): \([^)]*\) (\d+[.\d]*)")  # in a module's file
 
@@ -48,13 +49,18 @@ def machine_conditions() -> dict[str, str]:
         "system": f"{platform.system()} {platform.machine()}",
     }
     conditions["python"] = platform.python_version()
-    return conditions | {name: version(name) for name in PACKAGES} | {"compiler": compiler_name()}
+    versions = {name: opencv_version() if name == "opencv" else version(name) for name in PACKAGES}
+    return conditions | versions | {"compiler": compiler_name()}
 
 
 def conditions_text(conditions: Mapping[str, str] | None = None) -> str:
-    """The given or the present conditions on one line, for a table's caption; earlier ones have no compiler."""
+    """The given or the present conditions on one line, for a table's caption.
+
+    Conditions of earlier measurements have no compiler, or the full name of OpenCV's distribution.
+    """
     conditions = conditions or machine_conditions()
-    versions = [f"{name.partition('-')[0]} {conditions[name]}" for name in PACKAGES]
+    by_name = {key.partition("-")[0]: text for key, text in conditions.items()}
+    versions = [f"{name} {by_name[name]}" for name in PACKAGES]
     if "compiler" in conditions:
         versions.append(conditions["compiler"])
     return (

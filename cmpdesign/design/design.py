@@ -223,7 +223,7 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None
 
 
 def design_schema() -> dict[str, Any]:
-    """The JSON Schema of a design's TOML, for editors; it is stored in ``cmpdesign/design.schema.json``."""
+    """The JSON Schema of a design's TOML, for editors; stored in ``templates/design.schema.json``."""
     schema = Design.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "cmpdesign design"

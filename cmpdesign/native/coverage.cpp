@@ -2,6 +2,7 @@
 #include "base/binding.hpp"
 
 #include <cmath>
+#include <cstring>
 
 namespace cmp {
 
@@ -128,34 +129,86 @@ void add_side(View<float, 3> differences, const CoverageTask& task, Index s, Ind
   }
 }
 
-// Adds weight times samples to a line.
-void add_line(View<float, 1> line, View<const float, 1> samples, float weight) {
-  float* to = line.data();
-  const float* from = samples.data();
-  for (Index x = 0; x < line.size(); ++x) to[x] += weight * from[x];
+// Sixteen numbers, as many as the widest registers of a processor hold.
+using Lanes = float __attribute__((vector_size(64)));
+constexpr Index LANES = 16, GROUPS = 4;
+
+// Lines of samples with a weight each, of a point spread.
+struct WeightedLines {
+  View<const float, 1> weights;
+  const float* first;
+  std::array<Index, 2> steps;  // samples from a line to the next, and where a period of lines is over
+  Index period;
+
+  const float* line(Index k) const { return first + k % period * steps[0] + k / period * steps[1]; }
+};
+
+// Writes the weighted sum of the lines. The sums stay in registers.
+void fill_weighted_sum(const WeightedLines& lines, View<float, 1> out) {
+  constexpr Index BLOCK = LANES * GROUPS;
+  const Index count = out.size(), whole = count / BLOCK * BLOCK;
+  for (Index x = 0; x < whole; x += BLOCK) {
+    Lanes total0{}, total1{}, total2{}, total3{}, own;
+    for (Index k = 0; k < lines.weights.size(); ++k) {
+      const float weight = lines.weights[k];
+      const float* const from = lines.line(k) + x;
+      std::memcpy(&own, from, sizeof own);
+      total0 += weight * own;
+      std::memcpy(&own, from + LANES, sizeof own);
+      total1 += weight * own;
+      std::memcpy(&own, from + 2 * LANES, sizeof own);
+      total2 += weight * own;
+      std::memcpy(&own, from + 3 * LANES, sizeof own);
+      total3 += weight * own;
+    }
+    const std::array<Lanes, GROUPS> totals{total0, total1, total2, total3};
+    std::memcpy(out.data() + x, totals.data(), sizeof totals);
+  }
+  for (Index x = whole; x < count; ++x) {
+    float total = 0.0F;
+    for (Index k = 0; k < lines.weights.size(); ++k) total += lines.weights[k] * lines.line(k)[x];
+    out[x] = total;
+  }
+}
+
+constexpr Index ROWS = 4;  // summed at once: one sum alone waits for its own last addition
+
+// Writes the sums along rows (ROWS, columns) into the phases of each, (ROWS, oversampling, samples).
+//
+// Samples of the same phase are adjacent, so that the second point spread runs over contiguous memory.
+void fill_phases(View<const float, 2> lines, View<float, 3> phases) {
+  const Index columns = lines.size(1), oversampling = phases.size(1);
+  std::array<double, ROWS> totals{};
+  Index x = 0;
+  for (Index sample = 0; x < columns; ++sample) {
+    for (Index phase = 0; phase < oversampling && x < columns; ++phase, ++x) {
+      for (Index row = 0; row < ROWS; ++row) {
+        totals[row] += lines(row, x);
+        phases(row, phase, sample) = static_cast<float>(totals[row]);
+      }
+    }
+  }
 }
 
 // Point spread down the columns, cumulative sum along the rows, point spread along the rows.
 Array<float, 3> apply_point_spread(View<const float, 3> differences, const Spread& spread, Index count,
                                    Index width) {
   const Index planes = differences.size(0), columns = differences.size(2), oversampling = spread.oversampling;
-  Array<float, 3> image({planes, count, width}, 0.0F);
-  Array<float, 1> line({columns});
-  // samples of the same phase are adjacent, so that the second sum runs over contiguous memory
-  Array<float, 2> phases({oversampling, columns / oversampling + 1}, 0.0F);
+  Array<float, 3> image({planes, count, width});
+  Array<float, 2> lines({ROWS, columns}, 0.0F);
+  Array<float, 3> phases({ROWS, oversampling, columns / oversampling + 1}, 0.0F);
   for (Index plane = 0; plane < planes; ++plane) {
-    for (Index y = 0; y < count; ++y) {
-      line.fill(0.0F);
-      for (Index k = 0; k < spread.weights.size(); ++k)
-        add_line(line, differences[plane][oversampling * y + k], spread.weights[k]);
-      double total = 0.0;
-      for (Index x = 0; x < columns; ++x) {
-        total += line[x];
-        phases(x % oversampling, x / oversampling) = static_cast<float>(total);
+    for (Index y = 0; y < count; y += ROWS) {
+      const Index rows = std::min(ROWS, count - y);
+      for (Index row = 0; row < rows; ++row) {
+        const float* const top = differences[plane][oversampling * (y + row)].data();
+        run_loop<fill_weighted_sum>(WeightedLines{spread.weights, top, {columns, columns}, 1}, lines[row]);
       }
-      const auto target = image[plane][y];
-      for (Index k = 0; k < spread.weights.size(); ++k)
-        add_line(target, phases[k % oversampling].from(k / oversampling), spread.weights[k]);
+      fill_phases(lines, phases);
+      for (Index row = 0; row < rows; ++row) {
+        const WeightedLines shifted{spread.weights, phases[row].data(), {phases.size(2), 1}, oversampling};
+        run_loop<fill_weighted_sum>(shifted, image[plane][y + row]);
+      }
     }
   }
   return image;

@@ -22,6 +22,8 @@ void fill_values(View<const float, 1> light, View<const double, 1> light_of_valu
       continue;
     }
     Index value = first[static_cast<Index>(std::min(std::sqrt(here) * scale, static_cast<double>(steps)))];
+    // most often none or one is missing: the first one without a branch, which the processor could not guess
+    value += static_cast<Index>(value < last) & static_cast<Index>(light_of_value[value + 1] <= here);
     while (value < last && light_of_value[value + 1] <= here) ++value;
     // above the last value the last step continues: the sensor clips after the noise
     const double low = light_of_value[value], high = light_of_value[value + 1];

@@ -24,10 +24,11 @@ from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import Image, to_png
+from cmpdesign.libraries import OPENCV_DISTRIBUTIONS
 
 FORMAT, VERSION = "cmp-problem-report", 1
 MOST_PICTURES = 20
-_LIBRARIES = ("numpy", "opencv-contrib-python-headless", "opencv-python-headless", "opencv-python", "scipy")
+_LIBRARIES = ("numpy", *OPENCV_DISTRIBUTIONS, "scipy")
 _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same bundle has the same bytes
 
 

@@ -87,8 +87,14 @@ def measure_quality(
     return _quality(found, blur_px, estimate_noise(view.image, xy_px, cells.corners), edge_px)
 
 
-def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None) -> Quality:
-    """The quality of an image in which no cell was numbered; ``cells`` are the found cells, if any."""
+def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None, has_pattern: bool) -> Quality:
+    """The quality of an image in which no cell was numbered.
+
+    Args:
+        view: the image at full scale.
+        cells: the found cells, if any.
+        has_pattern: whether cells are neighbours as in a pattern; the area of other cells gives no edge.
+    """
     clipping = float(
         (view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE].max(axis=2) >= LIMITS.clipped_value).mean()
     )
@@ -97,7 +103,8 @@ def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None) -> 
     color = (cells.ink - 1).astype(np.uint8)
     chosen = _spread(color)
     found = _quality_at(view, np.ascontiguousarray(cells.center_px[chosen]), color[chosen], cells.edge_px)
-    return replace(_quality(found, np.nan, np.nan, cells.edge_px), clipping=clipping)
+    edge_px = cells.edge_px if has_pattern else np.nan
+    return replace(_quality(found, np.nan, np.nan, edge_px), clipping=clipping)
 
 
 def _quality_at(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
-from extractor.refine.measure.marker_scatter import BEND_BY_SCATTER, MarkerScatter
+from extractor.refine.measure.marker_scatter import MarkerScatter
 from extractor.refine.synthesis.gridlines import local_maps
 from extractor.result import Status
 
@@ -26,12 +26,10 @@ class VirtualLimits(NamedTuple):
     Attributes:
         max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt. Chosen.
         bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord. Chosen.
-        bend_by_scatter: as in ``BendingLimits``. Derived.
     """
 
     max_measured_offset: float = 0.08
     bend_uncertainty: float = 0.05
-    bend_by_scatter: float = BEND_BY_SCATTER
 
 
 LIMITS = VirtualLimits()

@@ -46,7 +46,7 @@ class Colors:
     Attributes:
         hsv: (H, W, 3) uint8, OpenCV's scale: H 0..179 (2 degrees per step), S and V 0..255.
         hue: (H, W) uint8, the channel H.
-        chroma: (H, W) uint8, max - min of B, G, R: 0 for black, gray and white in any light.
+        chroma: (H, W) uint8, max - min of B, G, R: 0 for black, gray and white in white light.
     """
 
     hsv: NDArray[np.uint8]

@@ -7,12 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.layout.gridline_slopes import end_couplings, scatter_bending, slope_weights
 from extractor.layout.reference import BLACK, Reference
 
 MAX_NEIGHBOURS = 6  # of a marker
 MAX_RING_MARKERS = 18  # in the two rings around a marker
 MAP_DERIVATIVES = 5  # x, y, xx, xy, yy
-MAX_CONDITION = 1e8  # of the normal equations of a cubic
+# Of a quadratic through the markers around another: how many determine its curvature, and what is added to the diagonal
+# of the normal equations of the curvature, in the unit of ``ring_vectors``.
+MIN_FIRM_MARKERS, FIRM_RIDGE = 8, 0.001
+# Of the normal equations of a map: a cubic has 2e2 to 3e3 with four rows of markers, and 4e4 or more with three.
+MAX_CONDITION = 1e4
 MAX_ONWARD_COSINE = np.cos(np.radians(150.0))  # between the two edges at a marker that form one gridline
 
 
@@ -31,12 +36,16 @@ class Topology(NamedTuple):
         ring_vectors: (M, 18, 2) float64, the layout vectors from a marker to its ``ring_markers``, in units of the
             mean edge, y up.
         derivative_stencil: (M, 5, 18) float64, weights of the differences to the ``ring_markers`` that give the
-            map's derivatives x, y, xx, xy, yy (least squares of a cubic) where all 18 exist; else 0.
+            map's derivatives x, y, xx, xy, yy by least squares: the first ones of a cubic, or of a quadratic where only
+            three rows of markers are there, as at the rim; the second ones of a quadratic through all of them, which
+            noise and scatter change least. 0 with fewer than 8 markers.
         edge_vectors: (E, 2) float64, from an edge's start to its end, in the unit of ``ring_vectors``.
         next_markers: (E, 2) int32, on the same gridline the marker before an edge's start and the marker after its end.
         third_differences: (E, 2) float64, the layout's third difference along these four markers, in the unit of
             ``ring_vectors``.
         next_edges: (M, 6) int32, the edge that follows each of the ``spokes`` on the same gridline.
+        end_couplings: (E, 6) float64, see ``gridline_slopes``.
+        scatter_bending: (E, 3) float64, see ``gridline_slopes``.
     """
 
     edges: NDArray[np.int32]
@@ -53,6 +62,8 @@ class Topology(NamedTuple):
     next_markers: NDArray[np.int32]
     third_differences: NDArray[np.float64]
     next_edges: NDArray[np.int32]
+    end_couplings: NDArray[np.float64]
+    scatter_bending: NDArray[np.float64]
 
 
 def topology_of(layout: Reference) -> Topology:
@@ -77,6 +88,9 @@ def topology_of(layout: Reference) -> Topology:
     ring_vectors = np.where(
         (ring_markers >= 0)[:, :, None], (xy[ring_markers] - xy[:, None]) / length.mean(), 0.0
     )
+    stencil = _derivative_stencil(ring_markers, ring_vectors)
+    edge_vectors = chord / length.mean()
+    slopes = slope_weights(stencil, ring_markers, edges, edge_vectors)
     return Topology(
         edges=layout.edges.astype(np.int32),
         cells=cells.astype(np.int32),
@@ -87,11 +101,13 @@ def topology_of(layout: Reference) -> Topology:
         spokes=spokes,
         ring_markers=ring_markers,
         ring_vectors=ring_vectors,
-        derivative_stencil=_derivative_stencil(ring_markers, ring_vectors),
-        edge_vectors=chord / length.mean(),
+        derivative_stencil=stencil,
+        edge_vectors=edge_vectors,
         next_markers=next_markers,
         third_differences=np.where(np.all(next_markers >= 0, axis=1)[:, None], third / length.mean(), 0.0),
         next_edges=_next_edges(spokes, edges, next_markers, key),
+        end_couplings=end_couplings(slopes, edges),
+        scatter_bending=scatter_bending(slopes, edges, edge_vectors, spokes),
     )
 
 
@@ -171,13 +187,40 @@ def _derivative_stencil(
     ring_markers: NDArray[np.int32], ring_vectors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(M, 5, 18) float64, see ``Topology.derivative_stencil``."""
+    known: NDArray[np.bool_] = np.asarray(ring_markers >= 0)
     x, y = ring_vectors[..., 0], ring_vectors[..., 1]
-    terms = np.stack([x, y, x * x / 2, x * y, y * y / 2, x * x * x, x * x * y, x * y * y, y * y * y], axis=2)
-    stencil = np.zeros((len(ring_markers), MAP_DERIVATIVES, MAX_RING_MARKERS))
-    full = (ring_markers >= 0).all(axis=1)
-    terms = terms[full]
-    gram = np.swapaxes(terms, 1, 2) @ terms
-    regular = np.linalg.cond(gram) < MAX_CONDITION if len(gram) else np.empty(0, np.bool_)
-    solutions = np.linalg.solve(gram[regular], np.swapaxes(terms[regular], 1, 2))[:, :MAP_DERIVATIVES]
-    stencil[np.flatnonzero(full)[regular]] = solutions
-    return stencil
+    quadratic = np.stack([x, y, x * x / 2, x * y, y * y / 2], axis=2)
+    cubic = np.concatenate(
+        [quadratic, np.stack([x * x * x, x * x * y, x * y * y, y * y * y], axis=2)], axis=2
+    )
+    out = np.zeros((len(ring_markers), MAP_DERIVATIVES, MAX_RING_MARKERS))
+    with np.errstate(divide="ignore"):
+        near = np.where(known, (x * x + y * y) ** -2.0, 0.0)
+    enough = np.flatnonzero(known.sum(axis=1) >= MIN_FIRM_MARKERS)
+    ridge = np.array([0.0, 0.0, *[FIRM_RIDGE] * 3])
+    first, second = slice(0, 2), slice(2, MAP_DERIVATIVES)
+    complete = (ring_markers >= 0).all(axis=1, keepdims=True)
+    even = np.where(complete, 1.0, near)
+    every = known.astype(np.float64)
+    fits = (quadratic, near, ridge, first), (cubic, even, 0.0, first), (quadratic, every, ridge, second)
+    for terms, weight, added, rows in fits:
+        solutions, regular = _least_squares(terms[enough], weight[enough], added)
+        out[enough[regular], rows] = solutions[regular, rows]
+    return out
+
+
+def _least_squares(
+    terms: NDArray[np.float64], weight: NDArray[np.float64], ridge: NDArray[np.float64] | float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(n, T, K) the weights that give T coefficients from K values, and (n,) whether the values determine them.
+
+    Args:
+        terms: (n, K, T). weight: (n, K), of the values. ridge: (T,), added to the diagonal of the normal equations.
+    """
+    weighted = np.swapaxes(terms * weight[..., None], 1, 2)
+    gram = weighted @ terms + ridge * np.eye(terms.shape[2])
+    eigenvalues = np.linalg.eigvalsh(gram)
+    regular = eigenvalues[:, -1] < MAX_CONDITION * eigenvalues[:, 0]
+    solutions = np.zeros(weighted.shape)
+    solutions[regular] = np.linalg.solve(gram[regular], weighted[regular])
+    return solutions, regular

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import localmap as native
+from extractor.layout.topology import FIRM_RIDGE, MIN_FIRM_MARKERS
 
 
 class RegularisedMapLimits(NamedTuple):
@@ -31,8 +32,8 @@ class RegularisedMapLimits(NamedTuple):
     min_sine2: float = 0.05
     min_neighbours: int = 2
     min_curved_neighbours: int = 5
-    min_firm_neighbours: int = 8
-    firm_ridge: float = 0.001
+    min_firm_neighbours: int = MIN_FIRM_MARKERS
+    firm_ridge: float = FIRM_RIDGE
     weak_ridge: float = 0.02
     linear_ridge: float = 1e9
 

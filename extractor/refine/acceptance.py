@@ -22,7 +22,8 @@ class AcceptanceLimits(NamedTuple):
     Attributes:
         max_shift: from the start place. Chosen.
         max_shift_all_cells: the same where all triangles agree on that: in steep views these lie so far off. Chosen.
-        max_deviation: of what is measured. Chosen.
+        max_deviation: of what is measured. Chosen: as many markers at the rim are accepted as with 0.03, when their
+            deviations were stated as if they had neighbours on all sides.
         min_information: 1/px^2, below which a marker counts as unknown: four times that before the measurement.
             Derived.
         bend_to_end_shift: the shift of a gridline's ends that remains, in deviations of its bending. Derived: as in
@@ -32,7 +33,7 @@ class AcceptanceLimits(NamedTuple):
 
     max_shift: float = 0.25
     max_shift_all_cells: float = 0.13
-    max_deviation: float = 0.03
+    max_deviation: float = 0.035
     min_information: float = 4 * PRIOR_PX**-2
     bend_to_end_shift: float = BENDING_LIMITS.bend_to_end_shift
     information: InformationLimits = INFORMATION_LIMITS

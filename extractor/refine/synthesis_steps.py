@@ -124,6 +124,7 @@ class SynthesisSolver:
             usual_px: a usual edge in the view.
         """
         wide_blur = estimate.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
+        shift = np.full_like(estimate.xy, np.nan)
         for step in range(schedule.steps):
             if step > 0:
                 estimate = with_pattern_moved(self._topology, estimate)
@@ -133,11 +134,11 @@ class SynthesisSolver:
             estimate = _overlap_corrected(stepped, drawing)
             change_px = abs(estimate.sigma - drawing.sigma) + abs(estimate.dot_gain - before.dot_gain)
             is_settled = change_px < LIMITS.small_change * drawing.sigma
-            shift = estimate.measured - drawing.xy
+            last, shift = shift, estimate.measured - drawing.xy
             if judged and is_settled and typical_move(shift, estimate.information) < schedule.small_move:
                 break
         remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawing.edge_px) ** 2 if wide_blur else 0.0
-        cov = convergence_covariance(estimate.measured - drawing.xy, drawing.sigma, remaining)
+        cov = convergence_covariance(shift, last, drawing.sigma, remaining)
         return estimate._replace(convergence_cov_px2=cov)
 
     def _with_bending(self, estimate: Estimate, wide_blur: bool, judged: bool) -> Estimate:

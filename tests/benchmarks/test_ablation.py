@@ -1,4 +1,6 @@
-"""The trial of rules: their texts, copies of the reader without them, what a trial measures, and which rules stay."""
+"""The ablation of rules: their source texts, copies of the reader without a rule, the measured figures, and the
+decision.
+"""
 
 from __future__ import annotations
 

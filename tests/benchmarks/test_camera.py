@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 
 from benchmarks.camera.page import documentation_blocks, failures_picture, shown_record, shown_results
-from benchmarks.camera.report import effect_rows, failure_lines, rows_table
+from benchmarks.camera.report import (
+    ALL_SEPARABLE,
+    COLORS_SEPARABLE,
+    effect_rows,
+    failure_lines,
+    rows_table,
+)
 from benchmarks.camera.run import main
 from benchmarks.suites.camera.cases import (
     COMBINED,
@@ -41,6 +47,7 @@ from benchmarks.suites.camera.reading import (
 )
 from benchmarks.suites.camera.sensor import demosaic, mosaic_channels
 from benchmarks.suites.camera.shoot import cached_layout, radiance, shoot
+from benchmarks.suites.scoring.contrast import neighbour_contrast
 from cmpdesign.patterns.colors import BLUE, COLORS, GREEN, RED
 from cmpdesign.scene import Camera, Optics, Plain, Scene, Sensor, render
 
@@ -79,7 +86,7 @@ def test_every_effect_changes_the_picture_by_its_strength(name: str) -> None:
 
 
 def test_distortion_moves_the_truth_and_the_picture_alike() -> None:
-    """A drawn marker lies at its true place: the reader finds it there, in a picture with much distortion."""
+    """A drawn marker has its true position: the reader finds this position in a picture with much distortion."""
     pose = Pose(pitch_px=22.0)
     straight = shoot(Chain(pose=pose)).marker_xy_px
     middle = np.array([(SIZE_PX[0] - 1) / 2, (SIZE_PX[1] - 1) / 2])
@@ -111,7 +118,9 @@ def test_chromatic_aberration_magnifies_red_and_shrinks_blue() -> None:
 
 
 def test_kernels_move_no_edge() -> None:
-    """Centred, of unit sum, and as wide as they say; pixels that share a point add a sixth of a square pixel."""
+    """Kernels are centred, have the sum 1 and the stated width; pixels that share a point add a sixth of a square
+    pixel.
+    """
     for kernel, variance in (
         (line_kernel(9.0, 30.0), 81 / 12 + 1 / 3),
         (disc_kernel(3.0), 9 / 2 + 1 / 3),
@@ -147,7 +156,9 @@ def test_demosaicing_keeps_flat_colors(method: Demosaicing, phase: int) -> None:
 
 
 def test_jpeg_halves_the_colors_where_it_says_so() -> None:
-    """Fine lines of red and blue of one luminance: full resolution keeps them, half resolution mixes them."""
+    """Fine lines of red and blue of one luminance: full resolution preserves the lines, half resolution mixes their
+    colors.
+    """
     image = np.zeros((64, 64, 3), np.uint8)
     image[:, ::2], image[:, 1::2] = (0, 0, 150), (255, 35, 0)
     full, half = (compressed(image, 95, chroma_420=chroma).astype(int) - image for chroma in (False, True))
@@ -254,12 +265,33 @@ def test_a_run_has_no_wrong_id_and_prints_and_writes(
     assert all(f" {column}" in head for column in ("95 %", "p50 ms", "p99 ms", "reasons"))
     figures = json.loads(out.read_text(encoding="utf-8"))
     rows = {row["effect"]: row for row in figures["effects"]}
-    assert list(rows) == [*KINDS, "together"] and figures["seed"] == SEED
+    assert list(rows) == [*KINDS, COLORS_SEPARABLE, ALL_SEPARABLE, "together"] and figures["seed"] == SEED
     assert rows["together"]["wrong_ids"] == 0 and rows["together"]["raised"] == 0
     assert rows["none"]["measured"] > 0.98 * rows["none"]["visible"] > 0
+    assert rows[COLORS_SEPARABLE]["measured"] > 0.98 * rows[COLORS_SEPARABLE]["visible"] > 0
     assert rows["together"]["measured"] > 0.8 * rows["together"]["visible"]
     assert main(["--seed", str(SEED), "--only", "0", "--save", str(tmp_path)]) == 0
     assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png"}
     for bad in (["--only", "nothing"], ["--pictures", "0"], ["--seed", "-1"]):
         with pytest.raises(SystemExit):
             main(bad)
+
+
+def test_the_contrast_is_that_of_the_neighbours_that_differ_least() -> None:
+    """Of flat colors drawn over the cells; a pair of inks that become alike counts, as does black."""
+    picture = shoot(Chain(lens=Lens(blur_px=0.5)))
+    layout, xy = picture.layout, picture.marker_xy_px
+    bgr = np.array([(30, 20, 200), (40, 150, 30), (200, 40, 20), (20, 20, 20), (240, 240, 240)], np.uint8)
+
+    def contrast(colors: np.ndarray) -> float:
+        image = np.zeros_like(picture.image)
+        for corners, color in zip(layout.cell_corners, layout.cell_color, strict=True):
+            cv2.fillConvexPoly(image, np.rint(xy[corners]).astype(int), colors[color].tolist())
+        return neighbour_contrast(image, layout, xy)
+
+    lab = cv2.cvtColor(bgr[None].astype(np.float32) / 255, cv2.COLOR_BGR2Lab)[0]
+    distance = np.linalg.norm(lab[:4, None] - lab[None, :4], axis=2) + 999 * np.eye(4)
+    assert contrast(bgr) == pytest.approx(distance.min(), abs=0.5)
+    alike = bgr.copy()
+    alike[RED] = alike[GREEN]
+    assert contrast(alike) == pytest.approx(0.0, abs=0.5)

@@ -1,4 +1,4 @@
-"""The benchmark of video codecs: lossless ones move nothing, the others what it states."""
+"""The benchmark of video codecs: lossless codecs move no marker, the others move markers by the stated distance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random damage on random surfaces: no marker is wrong, and the benchmark of it counts and names what is."""
+"""Random damage on random surfaces: no marker is wrong, and the benchmark counts and names wrong markers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The benchmark of live viewers: every frame reaches a client that reads, and one that does not holds nothing up."""
+"""The benchmark of live viewers: every frame reaches a client that reads, and a client that does not read delays no
+frame.
+"""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ LESS_KEPT = {
 
 
 def hard_but_promised(kind: ConditionKind) -> float:
-    """The step in the middle: hard enough to tell, mild enough for the promise."""
+    """The step in the middle: hard enough to show differences, mild enough for the stated limit."""
     return kind.steps[0] if kind.name in STANDARD_STEPS else kind.steps[len(kind.steps) // 2]
 
 
@@ -65,7 +65,9 @@ def test_no_marker_is_wrong_and_the_promise_is_kept(case: StressCase) -> None:
 
 
 def test_a_blur_far_from_the_first_estimate_is_drawn_anew() -> None:
-    """Inks that bled look a third wider blurred than their middles tell; with the narrow blur rim markers are lost."""
+    """The rims of bled inks look a third more blurred than their middles; with the smaller blur, markers of the rim are
+    lost.
+    """
     figures = result_of(StressCase("bleeding inks", 0.1, "elliptical", 200)).score
     assert figures.wrong == 0 and figures.kept >= PROMISED_SHARE * figures.sure
 

@@ -1,6 +1,6 @@
-"""The proof: what is written as SVG and drawn by another renderer is read back with the layout's ids.
+"""The proof: an SVG file, drawn by another renderer, is read with the layout's ids.
 
-A measured marker farther than 0.3 of its shortest edge from where it truly is carries a wrong id; there is none.
+A measured marker farther than 0.3 of its shortest edge from its true position has a wrong id; there is none.
 """
 
 from __future__ import annotations

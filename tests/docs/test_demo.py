@@ -1,4 +1,4 @@
-"""The demo: it runs, and its figures tell right from wrong."""
+"""The demo: its run, and its figures for correct and wrong results."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def blocks(page: Path) -> list[Block]:
 
 
 def differs(printed: str, documented: str) -> str | None:
-    """None when the texts are equal by the rules above; else the first line that is not."""
+    """None if the texts are equal by the rules above; else the first different line."""
     lines = [line.rstrip() for line in printed.rstrip().splitlines()]
     wanted = [line.rstrip() for line in documented.rstrip().splitlines()]
     while wanted:
@@ -122,7 +122,7 @@ def run_console(text: str) -> str:
 
 
 def quoted_lines(page: Path) -> list[str]:
-    """What the column "you see" of a page's tables quotes."""
+    """The quotations in the column "you see" of a page's tables."""
     tables = re.findall(
         r"^\| you see \|.*\n\|[-|]+\|\n((?:\|.*\n)+)", page.read_text(encoding="utf-8"), re.MULTILINE
     )
@@ -140,7 +140,9 @@ def commands(text: str) -> Iterator[tuple[str, str]]:
 
 
 def run_command(words: list[str]) -> tuple[str, int]:
-    """What a command prints, and its exit code. ``make`` targets must exist; the demo is run as make runs it."""
+    """The printed text of a command, and its exit code. ``make`` targets must exist; the demo is run as make runs
+    it.
+    """
     if words[0] == "cat":
         return Path(words[1]).read_text(encoding="utf-8"), 0
     if words[0] == "make":
@@ -191,11 +193,12 @@ def test_every_command_and_snippet_runs(page: Path, tmp_path: Path, monkeypatch:
         else:
             assert block.language == "toml" and block.name, f"{page.name}: a block of {block.language}"
             Path(block.name).write_text(block.text, encoding="utf-8")
+    names.clear()  # closes the files of snippets; Python 3.13 warns of files that the garbage collector closes
     assert [quote for quote in quoted_lines(page) if quote not in printed] == []
 
 
 def test_the_readmes_figure_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the demo finds is at least as good as what the README says of it."""
+    """The demo's figures are at least as good as the README's figures."""
     monkeypatch.chdir(tmp_path)
     stated = re.search(r"([\d.]+) px RMS error per axis", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert stated

@@ -1,4 +1,4 @@
-"""Every command of the page on laser jobs runs as it stands there."""
+"""Every command of the page on laser jobs runs unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The checklist of a release notices what does not agree; the whole of it is tried on this Python, marked slow."""
+"""The checklist of a release reports disagreements; the whole checklist runs on this Python, marked slow."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def build(config: Path, site: Path) -> subprocess.CompletedProcess[str]:
 
 
 def in_site(path: Path) -> Path:
-    """Where a file of the repository lies in the site."""
+    """The path of a repository's file in the site."""
     if path.suffix != ".md":
         return path
     return path.with_name("index.html") if path.name == "README.md" else path.with_suffix(".html")

@@ -1,4 +1,4 @@
-"""The example of a ROS 2 node, run without ROS: what it publishes are valid messages with the markers of the image."""
+"""The example of a ROS 2 node, run without ROS: the published messages are valid, and have the markers of the image."""
 
 from __future__ import annotations
 

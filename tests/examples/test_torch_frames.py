@@ -27,7 +27,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def worker() -> SimpleNamespace:
-    """What ``get_worker_info`` says."""
+    """The result of ``get_worker_info``."""
     return SimpleNamespace(info=None)
 
 

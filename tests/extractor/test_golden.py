@@ -1,4 +1,4 @@
-"""Markers of four pictures as they were read before: no change of the code moves one of them unnoticed.
+"""Markers of four pictures against stored results: the test notices a change of the code that moves a marker.
 
 The files hold the picture, and for each preset the markers, their covariances, statuses and virtual markers. A change
 that moves markers on purpose writes the files anew, and says by how much the accuracy of the suites changed.
@@ -24,7 +24,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 def differences(found: Arrays, expected: Arrays) -> list[str]:
-    """What differs by more than another processor's rounding of single precision, a hundredth of the noise."""
+    """The differences above the rounding of another processor in single precision, a hundredth of the noise."""
     limits = {"xy_px": 2e-3, "virtual_xy_px": 2e-3, "cov_px2": 0.02 * float(np.nanmax(expected["cov_px2"]))}
     said = [] if np.array_equal(found["status"], expected["status"]) else ["status"]
     for name, limit in limits.items():

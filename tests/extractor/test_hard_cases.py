@@ -144,7 +144,9 @@ def test_regions_of_one_pixel_are_clutter() -> None:
 @pytest.mark.parametrize("grain_px", [0.7, 2.0, 4.0])
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
 def test_a_pattern_amid_colored_noise_is_read(pattern: str, grain_px: float) -> None:
-    """Thousands of domains all around, so many that only what looks like a cell is looked at; coarse ones, too."""
+    """Thousands of domains around the pattern, so many that only domains like cells are examined; also coarse
+    domains.
+    """
     seen = render(scene(pattern), size=SIZE)
     grain = np.random.default_rng(2).standard_normal((600, 800, 3), dtype=np.float32)
     grain = np.asarray(cv2.GaussianBlur(grain, (0, 0), grain_px))
@@ -261,7 +263,7 @@ def test_a_pattern_far_from_the_origin_is_read_alike(origin_px: tuple[int, int])
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.9])
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
 def test_a_layer_with_few_markers_left_is_not_invented(pattern: str, share: float) -> None:
-    """Of the rim's cells, and of those beside them, any are missing: what is fitted between lies where it must."""
+    """Any cells of the rim and beside the rim are missing: fitted markers between have correct positions."""
     layout = scene(pattern).layout
     at_rim = (layout.marker_layer[layout.cell_corners] >= LAYERS - 1).any(axis=1) & (
         layout.cell_color < BLACK

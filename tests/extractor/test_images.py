@@ -1,4 +1,4 @@
-"""Whatever comes in: every kind of image, pictures of anything else, damaged references. No wrong id, ever."""
+"""Every kind of image, pictures of other things, damaged white cells: no id is wrong."""
 
 from __future__ import annotations
 
@@ -37,11 +37,23 @@ from tests.support.pictures import (
 )
 
 TRIANGULAR = PATTERNS[:3]
-STAGES = ["image", "color", "target", "segment", "seeds", "grow", "triangles", "cells", "mesh", "number"]
+STAGES = [
+    "image",
+    "light",
+    "color",
+    "target",
+    "segment",
+    "seeds",
+    "grow",
+    "triangles",
+    "cells",
+    "mesh",
+    "number",
+]
 
 
 def errors_px(markers: Markers, truth: Truth) -> NDArray[np.float64]:
-    """Distances of what was found from the truth; a wrong id is farther than some pixels."""
+    """Distances of the found markers from the truth; a wrong id has an error of many pixels."""
     found = np.isfinite(markers.xy_px).all(axis=1)
     return np.asarray(np.hypot(*(markers.xy_px[found] - truth.marker_xy_px[found]).T))
 
@@ -79,7 +91,7 @@ def test_conventions_of_a_result(pattern: str) -> None:
 
 @pytest.mark.parametrize("pattern", TRIANGULAR)
 def test_the_covariance_is_honest(pattern: str) -> None:
-    """Over many noises, errors squared are what the covariance says, within a factor of three either way."""
+    """Over many noises, squared errors agree with the covariance within a factor of three."""
     errors, claimed = [], []
     for seed in range(6):
         noisy = picture(pattern, noise=0.0)
@@ -93,7 +105,7 @@ def test_the_covariance_is_honest(pattern: str) -> None:
 
 
 def test_lost_markers_are_nan_and_lost() -> None:
-    """A view of a part: what is outside is lost, what is found is right, and a lost end loses its gridline."""
+    """A view of a part: markers outside are lost, found markers are correct, and a gridline with a lost end is lost."""
     seen = picture(size=(150, 130))
     markers = extractor().extract(seen.image)
     found = np.isfinite(markers.xy_px).all(axis=1)

@@ -1,4 +1,4 @@
-"""The quality of images against what they were made of, and reasons where few markers are reported."""
+"""The quality of images against their scenes, and reasons where few markers are reported."""
 
 from __future__ import annotations
 
@@ -130,6 +130,16 @@ def test_images_without_a_pattern_say_what_they_can() -> None:
         assert np.isnan([markers.quality.blur_px, markers.quality.contrast, markers.quality.edge_px]).all()
         assert len(markers.advice) == 1 + (clipping > 0)
     assert read(grey[..., 0]).quality is None
+
+
+def test_an_edge_is_that_of_a_pattern() -> None:
+    """Cells in noise have a size, and no edge; cells of a pattern without numbers have an edge."""
+    noise = read(np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8))
+    assert noise.reason is Reason.NO_PATTERN and np.isnan(noise.quality.edge_px)  # type: ignore[union-attr]
+    assert not any("px an edge" in text for text in noise.quality.hints)  # type: ignore[union-attr]
+    small = read(cv2.resize(shot().image, None, fx=0.1, fy=0.1, interpolation=cv2.INTER_AREA))
+    assert small.reason is Reason.REFERENCE_LOST
+    assert any("px an edge" in text for text in small.quality.hints)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("reason", Reason)

@@ -1,4 +1,4 @@
-"""The side that an image shows: what the layout does not expect is refused with a reason, never numbered wrongly."""
+"""The side in an image: an unexpected side is refused with a reason, and never numbered wrongly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Source code as the house rules look at it: its files, its imports and its functions, read without being run."""
+"""Source code for the tests of its rules: files, imports and functions, read without execution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One module prints, and few open files: what others wrote passes through their checks."""
+"""One module prints, and few modules open files: foreign text passes through their checks."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def calls(path: Path) -> list[ast.Call]:
 
 
 def prints(root: Path) -> list[str]:
-    """Where something is printed other than by terminal.py: by a call, or through a stream's name."""
+    """Printing outside of terminal.py: by a call, or through the name of a stream."""
     found = []
     for path in (path for package in PACKAGES for path in python_files(root / package)):
         if str(path.relative_to(root)) in PRINTS:

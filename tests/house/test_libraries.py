@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.metadata
 import importlib.util
 import re
 import tomllib
@@ -12,7 +13,13 @@ from pathlib import Path
 import pytest
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.libraries import extra, install_command, require_libraries
+from cmpdesign.libraries import (
+    OPENCV_DISTRIBUTIONS,
+    extra,
+    install_command,
+    opencv_version,
+    require_libraries,
+)
 from tests.house.source_trees import parsed, python_files
 
 ROOT = Path(__file__).parents[2]
@@ -100,3 +107,17 @@ def test_a_missing_library_names_the_extra_and_the_command() -> None:
 
 def test_every_module_of_an_extra_has_its_name_here() -> None:
     assert [name for name in sorted(LIBRARIES - {"rerun"}) if importlib.util.find_spec(name) is None] == []
+
+
+def test_one_distribution_of_opencv_is_required_and_installed() -> None:
+    """Two would overwrite each other. The version is found for every distribution of OpenCV."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = [*project["dependencies"], *(line for lines in EXTRAS.values() for line in lines)]
+    assert {re.split("[<>=]", line)[0] for line in lines if "opencv" in line} == {OPENCV_DISTRIBUTIONS[0]}
+    installed = {
+        name
+        for one in importlib.metadata.distributions()
+        if (name := one.metadata["Name"]).startswith("opencv")
+    }
+    assert len(installed) == 1 and installed < set(OPENCV_DISTRIBUTIONS)
+    assert opencv_version() == importlib.metadata.version(installed.pop())

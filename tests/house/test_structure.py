@@ -1,6 +1,6 @@
-"""The house of the code: rooms in an order, small folders, packages that say what they are for, short functions.
+"""The structure of the code: folders in an order, small folders, docstrings of packages, short functions.
 
-Every rule is a function of a folder that lists what breaks it, and is tried on a small bad tree, too.
+Every rule is a function of a folder, which lists the violations, and is also tested on a small bad tree.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def inner_imports(tree: Tree) -> Iterable[tuple[str, str, Import]]:
 
 
 def contracted(tree: Tree, module: str, target: str) -> tuple[str, str, str]:
-    """The folder that holds both, and which of its files and subfolders the two lie in."""
+    """The folder that contains both, and the two files or subfolders in which the two lie."""
     one, other = (
         [*name.split("."), *(["__init__"] if is_package(tree, name) else [])] for name in (module, target)
     )
@@ -139,7 +139,7 @@ def circles(root: Path) -> list[str]:
 
 
 def upward_imports(root: Path) -> list[str]:
-    """Of a room that stands later, or of names that a package above only hands on."""
+    """Imports of a later folder, or of names that a package above imports from elsewhere."""
     found = []
     for tree in (tree_of(root, package) for package in PACKAGES):
         order = ROOMS[tree.package].split()
@@ -203,7 +203,7 @@ def many_parameters(root: Path) -> list[str]:
 
 
 def unpacked_parameters(root: Path) -> list[str]:
-    """What comes in several parts has names for them: it is a record."""
+    """A result of several parts is a record with names."""
     found = []
     for path, function in every_function(root, ["extractor"]):
         names = {each.arg for each in parameters(function)}

@@ -1,4 +1,4 @@
-"""The tests' own rules: they test what comes out, by public names; where that cannot be, they say why."""
+"""The rules of the tests: tests use public names; a test of an internal function states the reason."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class TestFile(NamedTuple):
 
     @property
     def reason(self) -> str:
-        """The sentence that says why the outcome cannot be tested from outside."""
+        """The sentence with the reason for a test of an internal function."""
         lines = (ast.get_docstring(parsed(self.path)) or "").splitlines()
         found = [line.removeprefix(REASON).strip() for line in lines if line.startswith(REASON)]
         return found[0] if len(found) == 1 else ""
@@ -56,7 +56,7 @@ test_files.__test__ = False  # type: ignore[attr-defined]
 
 
 def named_imports(file: TestFile) -> Iterator[Import]:
-    """Imports of the packages; what is named in a string, as for a patch, counts as imported."""
+    """Imports of the packages; a module named in a string, as for a patch, counts as imported."""
     for each in imports_of(file.path, file.module):
         if each.module.partition(".")[0] in PACKAGES:
             yield each
@@ -94,7 +94,7 @@ def private_names(root: Path) -> list[str]:
 
 
 def inner_imports(file: TestFile) -> list[Import]:
-    """Of what lies inside the extractor."""
+    """Imports of internal modules of the extractor."""
     every = (each for each in named_imports(file) if each.module.partition(".")[0] == "extractor")
     return [
         each
@@ -104,7 +104,9 @@ def inner_imports(file: TestFile) -> list[Import]:
 
 
 def imports_from_inside(root: Path) -> list[str]:
-    """Of the extractor, by tests outside its rooms, or without a reason, or of another room's functions."""
+    """Imports of internal modules by tests outside of their folders, without a reason, or of another folder's
+    functions.
+    """
     found = []
     for file in test_files(root):
         for each in inner_imports(file):

@@ -1,4 +1,4 @@
-"""How far markers lie from the truth, and how far they say that they may."""
+"""Distances of markers from the truth, and their stated deviations."""
 
 from __future__ import annotations
 
@@ -24,5 +24,5 @@ def deviations(markers: Markers, seen: Rendered) -> Array:
 
 
 def rms(values: Array) -> float:
-    """The root mean square of those that are known."""
+    """The root mean square of the known values."""
     return float(np.sqrt(np.nanmean(np.square(values))))

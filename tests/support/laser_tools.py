@@ -38,7 +38,7 @@ def built(name: str, overrides: tuple[tuple[str, str], ...]) -> Layout:
 
 @dataclass
 class Burn:
-    """What a program did.
+    """The moves of a program.
 
     burnt: (x0, y0, x1, y1, S) of every straight move with the beam on; dark: the same of every other move.
     starts: how many moves had been burnt at each dark one. pauses: the same at each M0.
@@ -60,7 +60,7 @@ _WORD = re.compile(r"([A-Z])(-?(?:\d+\.?\d*|\.\d+))")
 
 
 def run_gcode(text: str, s_max: float = 1000.0) -> Burn:
-    """A GRBL 1.1 in laser mode, as its documentation says; anything that it does not know stops the test."""
+    """A GRBL 1.1 in laser mode, by its documentation; an unknown word stops the test."""
     burn, modes = Burn(), {"G": None, "M": 5.0, "F": None, "S": 0.0, "unit": None, "distance": None}
     x = y = 0.0
     for line in text.splitlines():
@@ -132,7 +132,7 @@ def swept(
 
 
 def filled(covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """With what falls out: everything that the burnt rim encloses."""
+    """The whole area that the burnt rim encloses, with the part that falls out."""
     from scipy.ndimage import binary_fill_holes
 
     return np.asarray(binary_fill_holes(covered))

@@ -1,4 +1,4 @@
-"""What several test files share: small layouts and their documents, made once."""
+"""Small layouts and their documents for several test files, made once."""
 
 from __future__ import annotations
 

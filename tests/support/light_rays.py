@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 class Slab(NamedTuple):
-    """A window and what lies behind it, in a camera's frame: its outer face is n x = ``distance_mm``."""
+    """A window and the medium behind the window, in a camera's frame: the outer face is n x = ``distance_mm``."""
 
     normal: Array
     distance_mm: float
@@ -30,7 +30,7 @@ def slab_at_rest(
 
 
 def refracted(direction: Array, normal: Array, before: float, behind: float) -> Array:
-    """(N, 3) unit vectors behind a face of unit vectors (N, 3) that meet it along ``normal``."""
+    """(N, 3) unit vectors behind a face, of unit vectors (N, 3) before the face with the given ``normal``."""
     ratio = before / behind
     cosine = direction @ normal
     inner = np.sqrt(1 - ratio**2 * (1 - cosine**2))

@@ -1,4 +1,4 @@
-"""Photographs of a written SVG by a renderer that is not ours: resvg draws it, OpenCV warps, blurs and noises it.
+"""Photographs of a written SVG by another renderer: resvg draws it, OpenCV warps, blurs and noises it.
 
     mm on the sheet -> raster of resvg -> image at OVERSAMPLING times the scale -> mean over boxes -> image
 

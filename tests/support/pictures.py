@@ -70,7 +70,7 @@ def _blobs(rng: np.random.Generator) -> Image:
 
 
 def _pink_noise(rng: np.random.Generator) -> Image:
-    """Amplitudes that fall with the spatial frequency, as in photographs."""
+    """A picture of amplitudes that decrease with the spatial frequency, as in photographs."""
     fy, fx = np.fft.fftfreq(240)[:, None], np.fft.rfftfreq(320)[None]
     falloff = 1 / np.maximum(np.hypot(fy, fx), 1 / 320)
     planes = [
@@ -91,7 +91,7 @@ def _triangles(rng: np.random.Generator) -> Image:
 
 
 def _mosaic(rng: np.random.Generator) -> Image:
-    """A Delaunay mosaic in the pattern's five colors: it even has gridlines that meet."""
+    """A Delaunay mosaic in the pattern's five colors, with common corners of gridlines."""
     image = np.full((240, 320, 3), 20, np.uint8)
     inks = [(45, 50, 200), (60, 150, 40), (190, 60, 45), (20, 20, 20), (245, 245, 245)]
     net = cv2.Subdiv2D((0, 0, 320, 240))

@@ -70,7 +70,7 @@ def unplaced(views: tuple[View, ...]) -> Rig:
 
 
 def opencv_px(view: View, xyz_mm: Array) -> Array:
-    """(N, 2) px by ``cv2.projectPoints``, which knows rotations only: a mirrored view's x is turned over."""
+    """(N, 2) px by ``cv2.projectPoints``, which accepts rotations only: a mirrored view's x is turned over."""
     flip = np.diag([-1.0, 1, 1]) if view.mirrored else np.eye(3)
     rotation, shift = flip @ view.R_camera_from_layout, flip @ view.t_camera_from_layout_mm
     if view.mirrored:  # x = -x' : the same as a negative focal length, with the tangential p2 turned over
@@ -88,7 +88,7 @@ def opencv_px(view: View, xyz_mm: Array) -> Array:
 def noisy(
     layout: Reference, view: View, xyz_mm: Array, rng: np.random.Generator, sigma_px: float = 0.02
 ) -> Markers:
-    """What an extractor would say of a view: anisotropic noise, and its covariance."""
+    """The simulated result of an extractor for a view: anisotropic noise, and its covariance."""
     count = len(xyz_mm)
     angle = rng.uniform(0, np.pi, count)
     cos, sin = np.cos(angle), np.sin(angle)
@@ -177,7 +177,7 @@ def binocular_shot(
 
 
 def rig_of(cameras: tuple[Pinhole, ...]) -> Rig:
-    """What a rig file would say: intrinsics and areas, no poses."""
+    """The content of a rig file: intrinsics and areas, no poses."""
     return Rig(
         tuple(
             View(

@@ -25,6 +25,22 @@ PIPELINE = (
 
 IMAGE = (
     Rule(
+        "grey card",
+        "the color of the light is taken from the image before hues are read",
+        "accuracy",
+        "extractor/image/grey_card.py",
+        "return self.ratio <= LIMITS.white_ratio",
+        "return True",
+    ),
+    Rule(
+        "local grey card",
+        "the color of the light is local",
+        "accuracy",
+        "extractor/image/grey_card.py",
+        "sigma_share: float = 0.15",
+        "sigma_share: float = 100.0",
+    ),
+    Rule(
         "target",
         "pixels outside the target area carry no ink",
         "accuracy",

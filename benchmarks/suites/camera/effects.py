@@ -241,6 +241,9 @@ EFFECTS: dict[str, Effect] = {
 }
 
 
+COLOR_EFFECTS = ("inks", "lamps", "surround", "lifted black", "white balance")
+
+
 def _rgb(values: np.ndarray) -> RGB:
     red, green, blue = (float(value) for value in values)
     return red, green, blue

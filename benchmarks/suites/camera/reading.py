@@ -13,6 +13,7 @@ from benchmarks.suites.camera.cases import CameraCase, sample_chain
 from benchmarks.suites.camera.parts import Chain
 from benchmarks.suites.camera.shoot import CameraPicture, cached_layout, shoot
 from benchmarks.suites.scoring.calibration import squared_distances
+from benchmarks.suites.scoring.contrast import neighbour_contrast
 from benchmarks.support.scenes import WRONG_SHARE, shortest_edges
 from cmpdesign.files.layout_json import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
@@ -40,6 +41,7 @@ class PictureResult:
         visible: visible markers.
         ms: processor time of the faster of two readings; the first one may load modules.
         reason: the extractor's reason, or the text of its exception; empty if there is none.
+        contrast: CIE76 of neighbouring cells, see ``neighbour_contrast``.
         raised: the extractor raised an exception.
     """
 
@@ -53,6 +55,7 @@ class PictureResult:
     visible: int
     ms: float
     reason: str = ""
+    contrast: float = float("nan")
     raised: bool = False
 
     @property
@@ -98,9 +101,16 @@ def raised_result(case: CameraCase, pitch_px: float, picture: CameraPicture, rea
     """The result of a picture on which the extractor raised an exception: all markers are lost, no time is known."""
     outcomes = "".join(np.where(picture.visible, LOST, UNSEEN))
     visible = int(picture.visible.sum())
+    none = float("nan")
+    contrast = picture_contrast(picture)
     return PictureResult(
-        case, pitch_px, outcomes, np.empty(0), 0.0, 0, 0, visible, float("nan"), reason, True
+        case, pitch_px, outcomes, np.empty(0), 0.0, 0, 0, visible, none, reason, contrast, True
     )
+
+
+def picture_contrast(picture: CameraPicture) -> float:
+    """CIE76 of neighbouring cells, see ``neighbour_contrast``."""
+    return neighbour_contrast(picture.image, picture.layout, picture.marker_xy_px)
 
 
 def score_picture(
@@ -122,6 +132,7 @@ def score_picture(
         visible=int(picture.visible.sum()),
         ms=ms,
         reason=str(markers.reason) if markers.reason else "",
+        contrast=picture_contrast(picture),
     )
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.libraries import extra
+from cmpdesign.libraries import extra, opencv_version
 
 # Packages whose results are in a shard's bytes.
-PACKAGES = ("numpy", "scipy", "opencv-contrib-python-headless", "pyarrow")
+PACKAGES = ("numpy", "scipy", "pyarrow")  # and OpenCV
 
 
 def limit_threads() -> None:
@@ -51,7 +51,7 @@ def one_thread() -> Iterator[None]:
 
 def installed_versions() -> dict[str, str]:
     """The versions on which the bytes of a shard depend."""
-    return {"cmpdesign": __version__} | {name: version(name) for name in PACKAGES}
+    return {"cmpdesign": __version__, "opencv": opencv_version()} | {name: version(name) for name in PACKAGES}
 
 
 def require_versions(wanted: Mapping[str, str]) -> None:

@@ -53,7 +53,8 @@ class Machine(_StrictModel):
 class Settings(_StrictModel):
     """The settings of one machine for one material.
 
-    Kerf is the full width at the front: ``kerf_x_mm`` of cuts along y, ``kerf_y_mm`` of cuts along x.
+    Kerf is the full width at the front: ``kerf_x_mm`` of cuts along y, ``kerf_y_mm`` of cuts along x. The settings of
+    pockets are needed for jobs with mode = "pocket" only.
     """
 
     kerf_x_mm: Sourced[Length]
@@ -62,9 +63,9 @@ class Settings(_StrictModel):
     cut_power_percent: Sourced[Percent]
     cut_speed_mm_s: Sourced[Positive]
     cut_passes: Sourced[Count]
-    pocket_power_percent: Sourced[Percent]
-    pocket_speed_mm_s: Sourced[Positive]
-    pocket_depth_per_pass_mm: Sourced[Length]
+    pocket_power_percent: Sourced[Percent] | None = None
+    pocket_speed_mm_s: Sourced[Positive] | None = None
+    pocket_depth_per_pass_mm: Sourced[Length] | None = None
 
 
 class Material(_StrictModel):

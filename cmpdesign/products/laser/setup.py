@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass
 
 from cmpdesign.design.laser_options import LaserOptions
+from cmpdesign.errors import DesignError
 from cmpdesign.products.laser.library import (
     Machine,
     Material,
     Settings,
+    Sourced,
     load_machine,
     load_material,
     settings_on,
@@ -65,7 +67,7 @@ def complete_setup(options: LaserOptions) -> LaserSetup:
     """Complete the options from the files of machine and material.
 
     Raises:
-        DesignError: an unknown machine or material, or a material without settings for the machine.
+        DesignError: an unknown machine or material, or a material without settings for the machine or the mode.
     """
     machine, material = load_machine(options.machine), load_material(options.material)
     settings = settings_on(material, options.machine)
@@ -75,8 +77,6 @@ def complete_setup(options: LaserOptions) -> LaserSetup:
     depth_mm = options.depth_mm or material.thickness_mm.value
     taper_deg = settings.taper_deg.value if options.taper_deg is None else options.taper_deg
     bottom_mm = min(kerf_x_mm, kerf_y_mm) - 2 * depth_mm * math.tan(math.radians(taper_deg))
-    pocket = options.mode == "pocket"
-    depth_passes = math.ceil(depth_mm / settings.pocket_depth_per_pass_mm.value - 1e-9)
     web_mm = options.minimum_web_mm
     return LaserSetup(
         options=options,
@@ -86,11 +86,9 @@ def complete_setup(options: LaserOptions) -> LaserSetup:
         kerf_y_mm=kerf_y_mm,
         taper_deg=taper_deg,
         depth_mm=depth_mm,
-        power_percent=options.power_percent
-        or (settings.pocket_power_percent if pocket else settings.cut_power_percent).value,
-        speed_mm_s=options.speed_mm_s
-        or (settings.pocket_speed_mm_s if pocket else settings.cut_speed_mm_s).value,
-        repeats=options.passes or (depth_passes if pocket else settings.cut_passes.value),
+        power_percent=options.power_percent or _cell_setting(options, material, "power_percent"),
+        speed_mm_s=options.speed_mm_s or _cell_setting(options, material, "speed_mm_s"),
+        repeats=options.passes or _cell_repeats(options, material, depth_mm),
         cut_power_percent=settings.cut_power_percent.value,
         cut_speed_mm_s=settings.cut_speed_mm_s.value,
         cut_repeats=settings.cut_passes.value,
@@ -98,6 +96,30 @@ def complete_setup(options: LaserOptions) -> LaserSetup:
         minimum_web_mm=material.minimum_web_mm.value if web_mm is None else web_mm,
         assumed=_assumed_values(options, material, settings),
     )
+
+
+def _cell_repeats(options: LaserOptions, material: Material, depth_mm: float) -> int:
+    """Passes over the cells."""
+    if options.mode != "pocket":
+        return settings_on(material, options.machine).cut_passes.value
+    return math.ceil(depth_mm / _cell_setting(options, material, "depth_per_pass_mm") - 1e-9)
+
+
+def _cell_setting(options: LaserOptions, material: Material, name: str) -> float:
+    """A setting of the material for the cells in the mode of the job.
+
+    Raises:
+        DesignError: the material's file leaves the setting out.
+    """
+    field = f"{'pocket' if options.mode == 'pocket' else 'cut'}_{name}"
+    found: Sourced[float] | None = getattr(settings_on(material, options.machine), field)
+    if found is None:
+        option = "passes" if name == "depth_per_pass_mm" else name
+        raise DesignError(
+            f'laser.mode = "{options.mode}": the material {material.name!r} has no {field} for this machine; add '
+            f'{field} = {{ value = ..., source = "..." }} to its file, or set laser.{option}'
+        )
+    return found.value
 
 
 def _assumed_values(options: LaserOptions, material: Material, settings: Settings) -> tuple[str, ...]:

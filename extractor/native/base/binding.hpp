@@ -7,7 +7,6 @@
 #pragma once
 
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 
 #include <array>
 #include <optional>
@@ -19,6 +18,7 @@
 #include <vector>
 
 #include "array.hpp"
+#include "numpy_arrays.hpp"
 #include "processor.hpp"
 
 namespace cmp {
@@ -36,7 +36,7 @@ struct Name {
 // The arrays that a call has borrowed from Python; given back when the call ends.
 class Borrowed {
  public:
-  Borrowed() { buffers_.reserve(16); }
+  Borrowed() { objects_.reserve(64); }
   Borrowed(const Borrowed&) = delete;
   Borrowed& operator=(const Borrowed&) = delete;
   ~Borrowed() {
@@ -53,6 +53,10 @@ class Borrowed {
           (name.text() + " is no array" + (is_written ? " that can be written" : "")).c_str());
     }
     return buffer;
+  }
+  void add_array(nb::handle array) {
+    note_changeable();
+    keep(nb::borrow(array));
   }
   void keep(nb::object object) { objects_.push_back(std::move(object)); }
 
@@ -100,21 +104,44 @@ struct FromPython<View<T, N>> {
   using Value = std::remove_const_t<T>;
 
   static View<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    if (const NumpyArray* array = fitting_array(object.ptr())) {
+      borrowed.add_array(object);
+      return strided({reinterpret_cast<T*>(array->data), array->shape, array->strides}, name);
+    }
     const Py_buffer& buffer = borrowed.add(object.ptr(), !std::is_const_v<T>, name);
     if (buffer.ndim != N || !has_dtype<Value>(buffer)) refuse(buffer, name);
+    return strided({static_cast<T*>(buffer.buf), buffer.shape, buffer.strides}, name);
+  }
+
+ private:
+  // The memory of an array.
+  struct Memory {
+    T* data;
+    const Py_ssize_t *shape, *strides;  // strides in bytes
+  };
+
+  // The array of NumPy that an object is, of the right type and dimensions; null for others.
+  static const NumpyArray* fitting_array(PyObject* object) {
+    const NumpyArray* array = Numpy::get().array(object);
+    const bool is_fitting = array != nullptr && array->dimensions == N && Numpy::has_type<Value>(*array) &&
+                            (std::is_const_v<T> || Numpy::is_writable(*array));
+    return is_fitting ? array : nullptr;
+  }
+
+  static View<T, N> strided(const Memory& memory, const Name& name) {
     std::array<Index, N> shape, stride;
+    std::copy_n(memory.shape, N, shape.begin());
+    if (std::find(shape.begin(), shape.end(), 0) != shape.end()) return {memory.data, shape};
     for (int k = 0; k < N; ++k) {
-      shape[k] = buffer.shape[k];
-      stride[k] = buffer.strides[k] / static_cast<Index>(sizeof(T));
-      bool is_whole = buffer.strides[k] % static_cast<Py_ssize_t>(sizeof(T)) == 0;
+      stride[k] = memory.strides[k] / static_cast<Index>(sizeof(T));
+      bool is_whole = memory.strides[k] % static_cast<Py_ssize_t>(sizeof(T)) == 0;
       bool has_gap = k == N - 1 && shape[k] > 1 && stride[k] != 1;
       if (!is_whole || has_gap)
         throw nb::type_error((name.text() + " has gaps within its rows; give a contiguous array").c_str());
     }
-    return {static_cast<T*>(buffer.buf), shape, stride};
+    return {memory.data, shape, stride};
   }
 
- private:
   [[noreturn]] static void refuse(const Py_buffer& buffer, const Name& name) {
     std::string text = name.text() + " must be " + dtype_name<Value>() + " of " + std::to_string(N) +
                        " dimensions, and is '" + (buffer.format == nullptr ? "B" : buffer.format) + "' of " +
@@ -239,12 +266,12 @@ struct FromPython<std::array<T, N>> {
 
 template <class T, int N>
 nb::object to_python(Array<T, N>&& array) {
-  std::array<std::size_t, N> shape;
-  for (int k = 0; k < N; ++k) shape[k] = static_cast<std::size_t>(array.size(k));
+  std::array<Py_ssize_t, N> shape;
+  std::copy(array.shape().begin(), array.shape().end(), shape.begin());
   T* data = array.release();
   if (data == nullptr) data = new T[1];
   nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
-  return nb::cast(nb::ndarray<nb::numpy, T>(data, N, shape.data(), owner));
+  return Numpy::get().create(data, N, shape.data(), std::move(owner));
 }
 
 template <class T>
@@ -307,6 +334,7 @@ struct Bound<F, Result (*)(Arguments...)> {
 // Makes a function known to Python under a name, with the names of its arguments.
 template <auto F>
 void bind(nb::module_& module, const char* name, typename Bound<F, decltype(F)>::Names names) {
+  Numpy::get();  // imported here, as an import within a call could wait for another thread
   module.def(
       name, [name, names](const nb::args& given) { return Bound<F, decltype(F)>::call(name, names, given); });
 }

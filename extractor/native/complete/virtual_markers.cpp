@@ -116,11 +116,11 @@ VirtualMarkers locate_on_edges(const GridlineEnds& ends, const layout::Topology&
   Array<double, 3> xy({count, m, 2}, NOT_A_NUMBER);
   Array<double, 4> cov({count, m, 2, 2}, NOT_A_NUMBER);
   Array<std::uint8_t, 2> status({count, m}, LOST);
-  const double free_variance = limits.bend_by_scatter * ends.scatter.variance;
   for (Index e = 0; e < count; ++e) {
     const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
     if (!(ends.known[a] && ends.known[b])) continue;
     const Gridline gridline(ends, topology, e, a, b);
+    const double free_variance = ends.scatter.bend_variance(topology.scatter_bending[e]);
     const double limit_px = limits.max_measured_offset * gridline.length;
     for (Index j = 0; j < m; ++j) {
       const double t = static_cast<double>(j + 1) / static_cast<double>(m + 1);

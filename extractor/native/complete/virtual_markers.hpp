@@ -14,11 +14,11 @@ namespace cmp::complete {
 
 // Limits of virtual markers; explained in extractor/complete/virtual_markers.py.
 struct VirtualLimits {
-  double max_measured_offset, bend_uncertainty, bend_by_scatter;
+  double max_measured_offset, bend_uncertainty;
 
   template <class F>
   static VirtualLimits read(const F& f) {
-    return {f["max_measured_offset"], f["bend_uncertainty"], f["bend_by_scatter"]};
+    return {f["max_measured_offset"], f["bend_uncertainty"]};
   }
 };
 

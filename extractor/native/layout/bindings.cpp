@@ -4,6 +4,7 @@
 #include "layout/lattice.hpp"
 #include "layout/lattice_tables.hpp"
 #include "layout/neighbour_tables.hpp"
+#include "layout/scatter_bending.hpp"
 
 namespace cmp::layout {
 
@@ -13,6 +14,7 @@ void add_layout(nb::module_ module) {
   bind<&cells_at>(module, "cells_at", {"axial", "cell_lookup"});
   bind<&corner_ids>(module, "corner_ids", {"axial"});
   bind<&neighbour_ids>(module, "neighbour_ids", {"axial", "steps", "layers"});
+  bind<&scatter_bending>(module, "scatter_bending", {"ids", "weights", "normals", "spokes"});
 }
 
 }  // namespace cmp::layout

@@ -24,6 +24,12 @@ struct Topology {
   View<const std::int32_t, 2> next_markers;
   View<const double, 2> third_differences;  // (E, 2) the layout's third difference along these four markers
   View<const std::int32_t, 2> next_edges;   // (M, 6) the edge that follows each spoke on the same gridline
+  // (E, 6) how a gridline moves with its start, its end and the other end, relative to a straight line: three
+  // by tangents, three by second derivatives
+  View<const double, 2> end_couplings;
+  // (E, 3) of a gridline's b, over the variance of the scatter: its variance with the map's tangents, its
+  // covariance with, and the variance of, that with second derivatives
+  View<const double, 2> scatter_bending;
 
   template <class F>
   static Topology read(const F& f) {
@@ -40,7 +46,9 @@ struct Topology {
             f["edge_vectors"],
             f["next_markers"],
             f["third_differences"],
-            f["next_edges"]};
+            f["next_edges"],
+            f["end_couplings"],
+            f["scatter_bending"]};
   }
 };
 

@@ -45,9 +45,9 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
       measure_dot_gain(sums, gradients, contrasts, edge_cells, state.sigma, limits.dot_gain);
   Array<double, 1> dot_gain_offset =
       update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
-  EliminatedBending bent =
-      update_for_bending(sums, gradients, {state.bend, state.roughness, state.weight, state.scatter.variance},
-                         lines, edges, state.noise, rule, limits.step);
+  EliminatedBending bent = update_for_bending(
+      sums, gradients, {state.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
+      lines, edges, state.noise, rule, limits.step);
   const Array<double, 1> pardon = pardoned_misfit(across.clearance, limits.misfit_tolerance);
   Array<double, 1> profile_weight =
       weigh_gridlines(sums, gradients, pardon, static_cast<double>(rule.values),
@@ -55,10 +55,12 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
           .weight;
   Array<double, 1> weight = judged ? Array<double, 1>(profile_weight.view())
                                    : lenient_weights(profile_weight, sums, edges, spokes, limits.outliers);
+  const Array<double, 2> curved = curving(topology.end_couplings, state.scatter.share, bent.response);
   const GridlineSystem system{sums,
                               weight,
                               lines,
                               contrasts,
+                              curved,
                               edges,
                               spokes,
                               state.sigma,

@@ -28,6 +28,7 @@ struct WeighedProfiles {
   ShiftGradients gradients;        // likewise
   Array<double, 1> weight;         // (n,) 0 to 1, similarity of gridlines to the pattern
   Array<double, 1> bend_variance;  // (n,) px^2
+  Array<double, 2> bend_response;  // (n, 7), as update_without_bending gives it
 };
 
 // The items of a list with these numbers (n,).
@@ -87,12 +88,13 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
   update_without_dot_gain(sums, gradients, across, selected_rows(topology.edge_cells, numbers),
                           state.dot_gain);
   const Array<double, 1> weight = selected_items(state.weight, numbers);
+  const Array<double, 2> by_scatter = selected_rows(topology.scatter_bending, numbers);
   EliminatedBending bent =
-      update_for_bending(sums, gradients, {bend, state.roughness, weight, state.scatter.variance}, lines,
+      update_for_bending(sums, gradients, {bend, state.roughness, weight, state.scatter, by_scatter}, lines,
                          ends, state.noise, limits.profiles.rule, limits.profiles.step);
   Array<double, 1> profile_weight = profile_weights(sums, gradients, clearance, read.count, limits);
-  return {std::move(lines), std::move(sums), std::move(gradients), std::move(profile_weight),
-          std::move(bent.variance)};
+  return {std::move(lines),          std::move(sums),          std::move(gradients),
+          std::move(profile_weight), std::move(bent.variance), std::move(bent.response)};
 }
 
 // (m,) 1/px^2, the information about the markers of the subproblem; those known and not hidden are held.
@@ -140,10 +142,13 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
   if (std::find(asked.begin(), asked.end(), true) == asked.end()) return;
   const Array<double, 1> prior = held_information(state.hidden, markers.xy, own.markers, step);
   const Array<double, 2> across = selected_rows(contrasts.contrasts, numbers);
+  const Array<double, 2> curved =
+      curving(selected_rows(topology.end_couplings, numbers), state.scatter.share, read.bend_response);
   const GridlineSystem system{read.sums.slice(0, count),
                               weight,
                               read.lines.slice(0, count),
                               across,
+                              curved,
                               own.ends,
                               own.spokes,
                               state.sigma,
@@ -158,8 +163,9 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
   const Array<bool, 1> agreed = selected_items(places.agreed, own.markers.view());
   const Array<bool, 1> is_intact = selected_items(places.is_intact, own.markers.view());
   const StartPlaces around{start, edge, agreed, is_intact};
-  auto [xy, cov] = accepted_markers(measured, information, read.bend_variance.slice(0, count), own.ends,
-                                    own.spokes, around, asked, limits.acceptance);
+  auto [xy, cov] = accepted_markers(measured, with_curving(information, system, step.information),
+                                    read.bend_variance.slice(0, count), own.ends, own.spokes, around, asked,
+                                    limits.acceptance);
   update_obstructed_markers(xy, cov, asked, around, limits.hidden);
   for (Index k = 0; k < asked.size(); ++k) {
     if (!asked[k]) continue;

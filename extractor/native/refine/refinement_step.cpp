@@ -48,7 +48,7 @@ StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& grad
                         const DrawnMarkers& drawn, bool overlapping, const StepLimits& limits) {
   const auto lines = system.lines;
   const auto edges = system.edges;
-  InformationArrays information =
+  const InformationArrays information =
       fisher_information(system, prior_information(drawn.hidden, limits), overlapping, limits.information);
   const Array<double, 2> right = gradient(system, gradients.start, gradients.end);
   const Array<double, 2> shift =
@@ -58,7 +58,8 @@ StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& grad
   ShiftedMarkers markers =
       markers_after_shift(drawn.xy, shift, least, system.weight, system.spokes, limits.weights);
   return {std::move(markers.measured), std::move(markers.reliable),
-          bend_after_shift(bend, bend_response, shift, lines, edges, limits.bending), std::move(information)};
+          bend_after_shift(bend, bend_response, shift, lines, edges, limits.bending),
+          with_curving(information, system, limits.information)};
 }
 
 WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,

@@ -42,7 +42,7 @@ struct StepLimits {
 // The bending of the gridlines as it was eliminated.
 struct EliminatedBending {
   Array<double, 1> variance;  // (E,) px^2
-  Array<double, 2> response;  // (E, 6), as update_without_bending gives it
+  Array<double, 2> response;  // (E, 7), as update_without_bending gives it
 };
 
 // The markers as drawn.
@@ -84,7 +84,7 @@ EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradi
 
 // Moves the markers by the shifts that the gradients ask for.
 //
-// system and gradients, bending eliminated from both; bend (E, 2) px and bend_response (E, 6), as
+// system and gradients, bending eliminated from both; bend (E, 2) px and bend_response (E, 7), as
 // bend_after_shift takes them; overlapping, the sums include the gridlines' ends.
 StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& gradients,
                         View<const double, 2> bend, View<const double, 2> bend_response,

@@ -20,16 +20,16 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   Array<double, 1> dot_gain_offset =
       update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
   EliminatedBending bent = update_for_bending(
-      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter.variance}, lines, edges,
-      state.noise, rule, limits.step);
+      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
+      lines, edges, state.noise, rule, limits.step);
   const Array<double, 1> pardon = bending_misfit(bent.variance, contrasts, sigma, limits.step.bending);
   GridlineWeights weighed =
       weigh_gridlines(sums, gradients, pardon, static_cast<double>(rule.values),
                       static_cast<double>(rule.min_places), rule.default_weight, weights);
   const double noise = std::isfinite(weighed.noise) ? weighed.noise : state.noise;
-  const GridlineSystem system{sums,      weighed.weight, lines,
-                              contrasts, edges,          topology.spokes,
-                              sigma,     noise * noise,  state.scatter.share};
+  const Array<double, 2> curved = curving(topology.end_couplings, state.scatter.share, bent.response);
+  const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,     curved,
+                              edges, topology.spokes, sigma, noise * noise, state.scatter.share};
   WeighedSolution solved = solve_weighed(system, gradients, drawing.bend, bent.response,
                                          {state.xy, state.hidden}, true, judged, limits.step);
   return {std::move(weighed.weight),

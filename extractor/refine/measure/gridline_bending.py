@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import measure as native
-from extractor.refine.measure.marker_scatter import BEND_BY_SCATTER
 from extractor.refine.synthesis.pixel_rows import LIMITS as PIXEL_LIMITS
 
 
@@ -42,8 +41,6 @@ class BendingLimits(NamedTuple):
         max_misfit_tolerance: the most of that, in units of the blur, squared. Chosen.
         min_significance: deviations by which bending must exceed its noise. Chosen.
         max_bend: b and s, in units of the gridline's length. Chosen.
-        bend_by_scatter: the least variance of b and s over that of the markers' scatter. Derived by Monte Carlo, see
-            ``BEND_BY_SCATTER``.
         min_determinant_share: of the product of the sums at both ends; a gridline whose determinant is smaller does not
             show bending. Chosen.
         min_information_share: of the information about b with both ends held; a gridline with less does not show
@@ -62,7 +59,6 @@ class BendingLimits(NamedTuple):
     max_misfit_tolerance: float = 0.1
     min_significance: float = 3.0
     max_bend: float = 0.3
-    bend_by_scatter: float = BEND_BY_SCATTER
     min_determinant_share: float = 1e-6
     min_information_share: float = 1e-3
     band: float = PIXEL_LIMITS.band

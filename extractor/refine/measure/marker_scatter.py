@@ -24,11 +24,6 @@ from numpy.typing import NDArray
 from extractor._native import measure as native
 from extractor.layout.topology import Topology
 
-# The variance of b (see ``gridline_bending``) of the cubics with second derivatives of the map, over that of the
-# scatter: the mean over the gridlines of patterns of 11 layers (397 markers), by Monte Carlo. It is 0.056 where
-# both rings of both ends are complete, and 0.36 along the rim.
-BEND_BY_SCATTER = 0.14
-
 
 class MarkerScatter(NamedTuple):
     """Independent scatter of the markers of a picture.

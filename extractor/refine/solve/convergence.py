@@ -21,12 +21,15 @@ class ConvergenceLimits(NamedTuple):
     Attributes:
         remaining_share: of a step, per blur, that another step would still correct. Chosen.
         max_remaining_share: of a step, at most. Chosen.
+        max_shrinking: of a marker's last step over the step before, at most; the following steps would shrink by the
+            same factor. Chosen.
         mean_over_median: of squares, by which the median of the squared shifts becomes their mean. Derived: 1 / ln 2,
             of the sum of two normal squares.
     """
 
     remaining_share: float = 1.0
     max_remaining_share: float = 0.5
+    max_shrinking: float = 0.9
     mean_over_median: float = 1.44
 
 
@@ -53,19 +56,23 @@ def typical_move(shift: NDArray[np.float64], information: Information) -> float:
 
 
 def convergence_covariance(
-    shift: NDArray[np.float64], sigma: float, remaining_share: float
+    shift: NDArray[np.float64], last: NDArray[np.float64], sigma: float, remaining_share: float
 ) -> NDArray[np.float64]:
     """The covariance of the remaining error after the last step.
 
-    The drawing responds less than linearly to shifts of the size of the blur.
+    The drawing responds less than linearly to shifts of the size of the blur. A marker whose steps shrink slowly is as
+    far from its place as the steps that would follow (a geometric series).
 
     Args:
         shift: (M, 2) px, the last step.
+        last: (M, 2) px, the step before, NaN where there was none.
         sigma: the blur, px.
         remaining_share: share of a usual step that always remains.
 
     Returns:
         (M, 2, 2) px^2.
     """
-    covariance: NDArray[np.float64] = native.convergence_covariance(shift, sigma, remaining_share, LIMITS)
+    covariance: NDArray[np.float64] = native.convergence_covariance(
+        shift, last, sigma, remaining_share, LIMITS
+    )
     return covariance

@@ -23,7 +23,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_layout_as_made_is_written(folder: Path, tmp_path: Path) -> None:
-    """The same bytes again, and what the library learns from the same pictures."""
+    """A second run writes the same bytes, and the library learns the same positions from the same pictures."""
     result = run(
         "calibrate", "pattern", folder / "layout.json", folder / "rest", "-o", tmp_path / "made.json"
     )

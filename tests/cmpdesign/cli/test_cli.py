@@ -1,4 +1,4 @@
-"""The command line without pictures: templates, build, check, schema; and what it says of bad input."""
+"""The command line without pictures: templates, build, check, schema; and the messages for bad input."""
 
 from __future__ import annotations
 

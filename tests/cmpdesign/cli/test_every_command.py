@@ -1,4 +1,4 @@
-"""What every command does in the same way: help texts, refused paths, Ctrl-C, missing libraries."""
+"""The common behaviour of all commands: help texts, refused paths, Ctrl-C, missing libraries."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ class Missing:
 sys.meta_path.insert(0, Missing())
 """
 # Without these nothing runs at all.
-BASE = {"numpy", "opencv-contrib-python-headless", "pydantic", "typer", "rich"}
+BASE = {"numpy", "opencv-python-headless", "pydantic", "typer", "rich"}
 SMALL = ("build", "honeycomb", "--set", "layers=1", "-o", "out", "--only")
 LIBRARIES = {
     "svgwrite": ("svgwrite", (*SMALL, "svg")),

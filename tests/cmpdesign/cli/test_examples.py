@@ -1,4 +1,4 @@
-"""The end of every help text: two examples, which are run as they stand in a folder with the files that they name."""
+"""The end of every help text: two examples, which are run unchanged in a folder with the files that they name."""
 
 from __future__ import annotations
 
@@ -60,7 +60,9 @@ def test_every_command_has_two_examples() -> None:
 def test_an_example_runs(
     line: str, prepared: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As it stands. One of each command also prints the document of its schema, asked for JSON if need be."""
+    """Each example is run unchanged. One example of each command also prints the document of its schema with
+    ``--json``.
+    """
     program, *words = shlex.split(line)
     command = " ".join(words[:2]) if words[0] in GROUPS else words[0]
     others = examples(*command.split())

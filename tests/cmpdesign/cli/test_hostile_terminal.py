@@ -1,4 +1,4 @@
-"""Nothing foreign reaches the terminal as it is: names, paths, options and values with escape sequences."""
+"""Foreign text is made printable before the terminal: names, paths, options and values with escape sequences."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ODD = f"a{ESCAPE}\x9b31m\u202e\nb"
 
 
 def clean(*arguments: object, code: int | None = None) -> str:
-    """What the command prints: no control characters but line breaks, and no traceback."""
+    """The printed text of the command: no control characters but line breaks, and no traceback."""
     result = run(*arguments)
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     printed = result.stdout + result.stderr

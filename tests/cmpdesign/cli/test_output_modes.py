@@ -1,4 +1,4 @@
-"""--json, --quiet and --verbose: what each command prints with them, and where."""
+"""--json, --quiet and --verbose: the output of each command on standard output and standard error."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ TERMINAL = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": "150"}
 
 
 def progress_of(folder: Path, *words: str, terminal: bool = True) -> str:
-    """What a command writes on standard error, without the codes that move the cursor."""
+    """The text of a command on standard error, without the codes that move the cursor."""
     env = TERMINAL if terminal else {"FORCE_COLOR": None}
     result = CliRunner().invoke(app, [word.replace("DIR", str(folder)) for word in words], env=env)
     assert result.exit_code == 0, result.output

@@ -1,4 +1,4 @@
-"""The command that renders: pictures, videos and folders from scene files; what it refuses, and interruptions."""
+"""The command that renders: pictures, videos and folders from scene files; refused input, and interruptions."""
 
 from __future__ import annotations
 

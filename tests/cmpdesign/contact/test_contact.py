@@ -92,7 +92,7 @@ def test_force_converges_with_the_grid() -> None:
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 def test_work_is_stored(nu: float) -> None:
-    """Without friction: the force along the way against half of traction times displacement."""
+    """Without friction, the force along the path agrees with half of traction times displacement."""
     way = [Motion(0.5 * i / 24) for i in range(1, 25)]
     layer = Elastomer(3.0, 0.5, nu)
     path = list(solve_path(layer, Ball(8.0), way, friction=0, size_mm=(14, 14), grid=64))
@@ -105,7 +105,9 @@ def test_work_is_stored(nu: float) -> None:
 
 
 def test_sticking_returns_its_work() -> None:
-    """With all stuck, shear is elastic: half of the force times the way, and nothing left when it goes back."""
+    """If the whole contact sticks, shear is elastic: half of the force times the path; after the way back, no force
+    remains.
+    """
     way = [Motion(0.2), Motion(0.2, (0.02, 0.0)), Motion(0.2)]
     pressed, sheared, back = solve_path(
         LAYER, Punch(3.0, 0.5), way, friction=math.inf, size_mm=(14, 14), grid=64
@@ -119,7 +121,7 @@ def test_sticking_returns_its_work() -> None:
 
 
 def cattaneo(share: float, nu: float = 0.5) -> tuple[Contact, float, float]:
-    """A ball on a thick layer, sheared by a share of what makes all of it slip; contact and radius of contact."""
+    """A ball on a thick layer, sheared by a share of the shear at full slip; the contact, and the radius of contact."""
     radius, press, rub = 10.0, 0.01, 0.3
     a, mu = math.sqrt(radius * press), 1 / (2 * (1 + nu))
     force = 4 / 3 / (1 - nu**2) * math.sqrt(radius) * press**1.5
@@ -152,7 +154,7 @@ def test_total_slip_takes_all_friction() -> None:
 
 @pytest.mark.parametrize("motion", [Motion(0.5, (0.3, 0.1)), Motion(0.5, twist_deg=8.0)])
 def test_friction_obeys_coulomb(motion: Motion) -> None:
-    """Nowhere more than the limit; what slips slips against its friction; what sticks has moved with the object."""
+    """Traction is nowhere above the limit; slip is against friction; sticking points have moved with the object."""
     before, found = list(
         solve_path(LAYER, Ball(8.0), [Motion(0.5), motion], friction=0.4, size_mm=(16, 16), grid=64)
     )
@@ -201,7 +203,9 @@ def test_torque_of_a_far_twist_is_what_the_support_takes() -> None:
 
 
 def test_moment_is_about_the_object_where_it_is() -> None:
-    """Stuck and sheared by half its radius, a punch takes its load along; without friction it slides to a new load."""
+    """A sticking punch, sheared by half of its radius, moves its load; without friction the punch slides to a new
+    load.
+    """
     for friction in (math.inf, 0.0):
         found, pressed = (
             solve(LAYER, Punch(2.0, 0.5), motion, friction=friction, size_mm=(14, 14), grid=56, steps=2)
@@ -223,7 +227,7 @@ def test_twist_is_counter_clockwise_and_far_twists_slip() -> None:
 
 
 def test_symmetry() -> None:
-    """What is done along y is what is done along x, turned; mirrored loads give mirrored answers."""
+    """A load along y gives the turned result of a load along x; mirrored loads give mirrored results."""
     along_x = solve(LAYER, Ball(9.0), Motion(0.6, (0.3, 0.0)), size_mm=(18, 18), grid=48)
     along_y = solve(LAYER, Ball(9.0), Motion(0.6, (0.0, 0.3)), size_mm=(18, 18), grid=48)
     turned = np.swapaxes(along_x.displacement_mm, 0, 1)[..., [1, 0, 2]]
@@ -273,7 +277,7 @@ def test_friction_needs_few_increments() -> None:
     ids=lambda thing: type(thing).__name__,
 )  # fmt: skip
 def test_every_object_lies_on_the_surface(thing: Ball) -> None:
-    """In contact the surface follows the object, beside it stays below, and nothing pulls."""
+    """The surface in contact is on the object, the surface beside is below the object, and no pressure is negative."""
     found = solve(LAYER, thing, Motion(0.4), friction=0, size_mm=(16, 16), grid=80)
     x, y = np.meshgrid(found.x_mm, found.y_mm)
     gap = thing.height_mm(x, y) - 0.4 - found.displacement_mm[..., 2]
@@ -286,13 +290,13 @@ def test_every_object_lies_on_the_surface(thing: Ball) -> None:
 
 @pytest.mark.parametrize("motion", [Motion(1.0, (0.8, 0.0)), Motion(1.0, twist_deg=20.0)])
 def test_sheared_and_twisted_contacts_take_few_answers(motion: Motion) -> None:
-    """The layer's answer is what a contact's time goes into: eight increments, of which four are solved twice."""
+    """Most of a contact's time is the layer's response: eight increments, of which four are solved twice."""
     found = solve(LAYER, Ball(12.0), motion, size_mm=(24, 24), grid=96)
     assert found.iterations < 360 and not [one for one in found.warnings if "solver" in one]
 
 
 def test_much_friction_is_solved_too() -> None:
-    """Where the limit follows the pressure by so much that renewing it at every step runs in circles."""
+    """The limit depends so much on the pressure that an update at every step does not converge."""
     for thing, layer in (
         (Ring(4.0, 1.0), Elastomer(THICK, 0.3, 0.3)),
         (Cube(6.0, 0.3), Elastomer(10.0, 0.3, 0.3)),
@@ -324,7 +328,7 @@ def test_surface_is_the_displacement_between_and_zero_far_away() -> None:
 def test_surface_touches_the_object_and_keeps_its_volume(
     friction: float, motion: Motion, lost: float
 ) -> None:
-    """Where it presses, the surface lies on the ball, at the points' places in space; what is dented bulges up.
+    """The pressed surface lies on the ball, at the positions of the points in space; the surface around bulges up.
 
     The solved area ends where some bulge is left: as much as linear theory has there.
     """
@@ -365,7 +369,7 @@ def test_pattern_at_the_surface_is_the_surface_and_below_it_moves_as_the_layer_d
 
 
 def test_sliding_contact_moves_on() -> None:
-    """With little friction a sheared ball presses where it stands, not where it came from."""
+    """With little friction, a sheared ball presses at its present position, not at its earlier position."""
     slid, there = (
         solve(LAYER, ball, motion, friction=0.02, size_mm=(18, 18), grid=60)
         for ball, motion in (
@@ -380,7 +384,9 @@ def test_sliding_contact_moves_on() -> None:
 
 
 def test_contact_is_found_where_the_surface_bulges_up() -> None:
-    """A collar around a punch, too high for the flat surface, is touched by what the punch squeezes out."""
+    """A collar around a punch, too high for the flat surface, is touched by the surface that bulges beside the
+    punch.
+    """
     axis = 0.1 * (np.arange(141) - 70)
     r = np.hypot(*np.meshgrid(axis, axis))
     for friction in (0.0, 0.5):

@@ -1,4 +1,4 @@
-"""What a contact takes: objects' shapes, height maps from files, the table of a scene, and values that cannot be."""
+"""The input of a contact: shapes of objects, height maps from files, the table of a scene, and impossible values."""
 
 from __future__ import annotations
 

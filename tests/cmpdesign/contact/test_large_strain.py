@@ -1,4 +1,4 @@
-"""Where linear theory ends: a neo-Hookean layer in finite elements, round, under growing pressure."""
+"""The limit of linear theory: a round neo-Hookean layer in finite elements under growing pressure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RADIUS, FAR = 1.2, 5.0
 
 
 def pressure(r: Array) -> Array:
-    """Of 1 in the middle, smooth to zero at the radius."""
+    """The pressure is 1 in the middle and falls smoothly to zero at the radius."""
     return np.where(r < RADIUS, (1 - np.minimum(r / RADIUS, 1) ** 2) ** 2, 0.0)
 
 
@@ -103,7 +103,7 @@ def tangent(u: Any, v: Any, w: Any) -> Any:
 
 
 def linear_strain(load_mpa: float) -> tuple[float, Array]:
-    """What the contact's solver says of the same load: its largest strain, and the surface at ``places``."""
+    """The result of the contact's solver for the same load: the largest strain, and the surface at ``places``."""
     cells, step = 161, 0.05
     x = step * (np.arange(cells) - cells // 2)
     traction = np.zeros((3, cells, cells))

@@ -144,7 +144,7 @@ def test_a_load_always_does_work(nu: float, power: float) -> None:
 
 
 def test_pressure_pushes_outwards_when_incompressible() -> None:
-    """And inwards on a thick layer that gives way, as a half-space does."""
+    """The displacement is inwards on a thick compressible layer, as on a half-space."""
     for nu, thickness, sign in ((0.5, 1.0, 1), (0.3, 100.0, -1)):
         kernels = green_kernels(Elastomer(thickness, 1.0, nu), 0.1, 32)
         of_pressure = -kernels.xz[0, 5:20]
@@ -223,7 +223,7 @@ def test_reciprocity_and_energy(thickness: float, nu: float) -> None:
 @pytest.mark.parametrize("nu", [0.3, 0.5])
 @pytest.mark.parametrize("thickness", [0.2, 3.0, 1e3])
 def test_preconditioner_is_symmetric_positive_and_near_the_inverse(thickness: float, nu: float) -> None:
-    """Of what it undoes, the layer makes nearly what was given."""
+    """The layer's response to the inverse nearly equals the input."""
     shape = (16, 12)
     operator = ComplianceOperator(green_kernels(Elastomer(thickness, 1.0, nu), 0.1, 32), shape)
     for components in (1, 3):

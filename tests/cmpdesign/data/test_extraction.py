@@ -35,7 +35,7 @@ CODECS = {
 
 
 def numbered_frames() -> list[np.ndarray]:
-    """Images that tell their number: the gray level."""
+    """Images whose gray level is their number."""
     noise = np.random.default_rng(0).integers(0, 6, (SIZE[1], SIZE[0], 3), np.uint8)
     return [noise + np.uint8(10 * number) for number in range(FRAMES)]
 
@@ -137,7 +137,7 @@ def test_the_rows_are_what_the_extractor_finds(sources: Path, tmp_path: Path) ->
 
 def test_a_source_is_given_once(sources: Path, tmp_path: Path) -> None:
     words = (sources / "layout.json", sources / "press.mkv", sources / "press.mkv")
-    assert "press.mkv: is given twice" in refused("extract", *words, "-o", tmp_path / "out")
+    assert "press.mkv is given twice" in refused("extract", *words, "-o", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -47,7 +47,7 @@ def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def started(*command: object) -> Iterator[subprocess.Popen[str]]:
-    """A program in a session of its own; what is left of it is killed at the end."""
+    """A program in a separate session; its remaining processes are killed at the end."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
         [sys.executable, *map(str, command)], cwd=ROOT, env=environment, text=True, start_new_session=True,
@@ -185,7 +185,7 @@ def test_without_its_scheduler_a_run_ends_and_another_goes_on(serial: Path, tmp_
 
 
 def can_mount() -> bool:
-    """Whether this user may mount a small file system of its own."""
+    """Whether this user may mount a small file system."""
     if shutil.which("unshare") is None:
         return False
     mount = "mount -t tmpfs -o size=1m none /mnt"

@@ -19,7 +19,7 @@ SQUARE = 'pattern = "square"\nlayers = 3\npitch_mm = 2.0\n'
     [
         ("frames = 4", "frames = 5", "frames is 5; it must be a multiple of frames_a_shard, 2, as in 6"),
         ("frames = 4", "frame = 4", "frame is unknown (did you mean frames?)"),
-        ('["small.toml"]', '["small.toml", "small.toml"]', "designs has two of the name small"),
+        ('["small.toml"]', '["small.toml", "small.toml"]', "designs has two designs of the name small"),
         ('["small.toml"]', '["smal.toml"]', "smal.toml: no such file"),
         ('["small.toml"]', '["square.toml"]', "the design square has no triangles"),
         ('["small.toml"]', '["small.toml"]\nweights = [1, 2]', "designs: weights is [1.0, 2.0]"),
@@ -27,7 +27,7 @@ SQUARE = 'pattern = "square"\nlayers = 3\npitch_mm = 2.0\n'
         ("noise = {", "nose = {", "[sensor] nose is unknown (did you mean noise?)"),
         ("noise = {whole = [1, 2]}", "noise = {uniform = [0, 256]}", "it must lie between 0 and 255"),
         ("noise = {whole = [1, 2]}", "noise = {uniform = [2, 1]}", "scene.sensor.noise: uniform is [2, 1]"),
-        ("size_px", "seed = 3\nsize_px", "scene.seed has no place in a plan"),
+        ("size_px", "seed = 3\nsize_px", "scene.seed is not allowed in a plan"),
         ('kind = "cube"', 'kind = "cub"', "contact.indenter.kind is 'cub' (did you mean cube?)"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Shards: what is in them is true, and they are whole or not there, in whatever order they are made."""
+"""Shards: the content is true, and a shard is complete or absent, in any order of making."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ def test_any_order_gives_the_same_bytes(made: Path, tmp_path: Path) -> None:
 
 
 def test_two_workers_give_the_same_bytes(made: Path, tmp_path: Path) -> None:
-    """Each in a process of its own, from the command line."""
+    """Each run is a separate process, from the command line."""
     result = run("dataset", write_plan(tmp_path), "-o", tmp_path / "data", "--workers", 2)
     assert result.exit_code == 0, result.output
     assert "4 frames in 2 shards" in result.stdout
@@ -203,7 +203,7 @@ def test_two_workers_give_the_same_bytes(made: Path, tmp_path: Path) -> None:
 
 @contextmanager
 def largest_file(size: int) -> Iterator[None]:
-    """Within this context, the system lets this process write no file beyond a size."""
+    """Within this context, the system limits the size of files that this process writes."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
@@ -256,7 +256,7 @@ def test_a_changed_plan_is_noticed(made: Path, tmp_path: Path) -> None:
     assert "holds a data set of another plan" in refused("dataset", other, "-o", folder)
     plan = folder / "plan.json"
     plan.write_text(plan.read_text(encoding="utf-8").replace('"seed": 0', '"seed": 1'), encoding="utf-8")
-    assert "plan.json: was changed" in refused("dataset", write_plan(tmp_path), "-o", folder)
+    assert "plan.json was changed" in refused("dataset", write_plan(tmp_path), "-o", folder)
 
 
 def test_damage_is_told_with_what_helps(made: Path, tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_damage_is_told_with_what_helps(made: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"000001.parquet: cannot be read \(.*make the shard again"):
         load(folder)[2]
     (folder / "images" / "000000.tar").write_bytes(b"no tar" * 200)
-    with pytest.raises(InputError, match=r"000000.tar: is no tar file"):
+    with pytest.raises(InputError, match=r"000000.tar is no tar file"):
         load(folder)[0]
     for text in ("{}", "[1]", "no JSON", '{"plan": "other", "shards": [{"shard": "../../x"}]}'):
         (folder / "manifest.json").write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Designs: what is accepted, what is refused and how, and the schema for editors."""
+"""Designs: accepted values, refused values with their messages, and the schema for editors."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import cmpdesign
 from cmpdesign.design.design import Design, design_schema, design_schema_text, load_design
+from cmpdesign.design.templates import templates_folder
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.build import build_layout
 from cmpdesign.patterns import registered_patterns
@@ -158,7 +158,7 @@ def test_a_design_of_ones_own(tmp_path: Path) -> None:
 
 
 def test_the_shipped_schema_is_current() -> None:
-    shipped = Path(cmpdesign.__file__).with_name("design.schema.json")
+    shipped = templates_folder() / "design.schema.json"
     assert shipped.read_text(encoding="utf-8") == design_schema_text()
 
 

@@ -1,4 +1,4 @@
-"""Fiducials: where they lie; the layout file carries them; old files without them still read."""
+"""Fiducials: their positions, their entries in the layout file, and older files without fiducials."""
 
 from __future__ import annotations
 

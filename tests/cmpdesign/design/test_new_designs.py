@@ -14,12 +14,10 @@ from pydantic import BaseModel
 
 from cmpdesign import Design, DesignError, build_layout, load_design
 from cmpdesign.design.commented_toml import STARTING_VALUES, commented_toml
-from cmpdesign.design.templates import find_template, template_kinds, template_words
+from cmpdesign.design.templates import find_template, template_kinds, template_words, templates_folder
 from tests.support.command import refused, run
 
-SCHEMA = json.loads(
-    (Path(__file__).parents[3] / "cmpdesign" / "design.schema.json").read_text(encoding="utf-8")
-)
+SCHEMA = json.loads((templates_folder() / "design.schema.json").read_text(encoding="utf-8"))
 COMMENTED_FIELD = re.compile(r"^# (\w+) = (.*)$", re.MULTILINE)
 
 

@@ -1,4 +1,4 @@
-"""Every shipped template builds, has nothing wrong with it, and says where its numbers come from."""
+"""Every shipped template builds without findings, and names the source of its numbers."""
 
 from __future__ import annotations
 

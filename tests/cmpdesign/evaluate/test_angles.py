@@ -1,4 +1,4 @@
-"""Single cells: the deformations do what they say, and recognition ends where the formulas say it must."""
+"""Single cells: deformations have the stated size, and recognition ends at the limit of the formulas."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cmpdesign.evaluate.measures.single_cells import (
 
 
 def inner_angle_deg(corners: np.ndarray) -> float:
-    """Of the first corner, from 0 to 360, measured inside a polygon that is clockwise to the eye."""
+    """The angle at the first corner, from 0 to 360 deg, inside a polygon that is clockwise in the image."""
     one, other = corners[1] - corners[0], corners[-1] - corners[0]
     return float(np.degrees(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other)) % 360)
 

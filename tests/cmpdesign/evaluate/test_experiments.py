@@ -81,7 +81,7 @@ def test_reliability(sensor_file: Path, tmp_path: Path) -> None:
 
 
 def test_a_turned_contact_is_the_contact_turned() -> None:
-    """Turned by a quarter, what moved along x moves along y."""
+    """In the picture turned by 90 degrees, displacements along x become displacements along y."""
     slope = PlacedSurface(lambda xy: np.column_stack([xy + [[0.1, 0.0]], 0.01 * xy[:, 0]]), (1.0, 2.0))
     turned = PlacedSurface(slope.surface_at_origin, (1.0, 2.0), 90.0)
     np.testing.assert_allclose(slope.displacement_mm(np.array([[4.0, 2.0]])), [[0.1, 0, 0.03]], atol=1e-12)
@@ -206,7 +206,7 @@ def test_conditions_stay_in_their_ranges() -> None:
 
 
 def test_pictures_and_the_square_readers_have_the_sensors_response() -> None:
-    """Read by its own response, a linear camera's picture gives what an sRGB camera's gives."""
+    """A linear camera's picture, read with the linear response, gives the result of an sRGB camera's picture."""
     rms, brightness = {}, {}
     for response in ("srgb", "linear"):
         text = small_sensor_text().replace('response = "srgb"', f'response = "{response}"')

@@ -1,4 +1,4 @@
-"""The measures of the experiments on point sets whose answer is known."""
+"""The measures of the experiments on point sets with known results."""
 
 from __future__ import annotations
 

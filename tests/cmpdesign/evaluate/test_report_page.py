@@ -11,7 +11,7 @@ from cmpdesign.evaluate.report.page import MANY_COLUMNS, Section, Table, report_
 
 @pytest.mark.parametrize("columns", [2, MANY_COLUMNS, MANY_COLUMNS + 1, 30])
 def test_a_table_cannot_run_beyond_its_page(columns: int) -> None:
-    """Every table lies in a box that scrolls; names may break; tables of many columns are set smaller."""
+    """Every table is in a box that scrolls; long names may wrap; tables of many columns have a smaller font."""
     table = Table(
         "caption", [f"h{i}" for i in range(columns)], [["a-very-long-name " * 3, *["1"] * (columns - 1)]]
     )

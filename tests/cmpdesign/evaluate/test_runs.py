@@ -1,4 +1,4 @@
-"""Runs: a journal that survives crashes, and results that depend on neither order nor processes."""
+"""Runs: a journal that is readable after a crash, and results that depend on neither order nor processes."""
 
 from __future__ import annotations
 

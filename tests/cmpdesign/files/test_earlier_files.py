@@ -1,4 +1,4 @@
-"""A build takes away what its own earlier builds left behind, and nothing else."""
+"""A build removes the files of earlier builds that are not made again, and no other file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cmpdesign.products.registry import PRODUCTS
 
 
 def build(output: Path, files: dict[str, str | bytes]) -> list[str]:
-    """As the command does it; what was removed, by name."""
+    """Build as the command does; the names of the removed files."""
     listed = files_with_lists(files, ["mold/", "mesh/"])
     stale = find_stale_files(output, listed)
     for name, content in listed.items():
@@ -55,7 +55,7 @@ def test_changed_files_stay(tmp_path: Path) -> None:
     "name", ["../a.svg", "../../elsewhere.txt", "sub/../../a.svg", "link/a.svg", "folder"]
 )
 def test_nothing_outside_the_folder_is_touched(name: str, tmp_path: Path) -> None:
-    """Not even when the list says so."""
+    """Files outside of the folder are not removed even if the list names them."""
     output = tmp_path / "out"
     build(output, FIRST)
     (tmp_path / "elsewhere.txt").write_text("1")
@@ -135,7 +135,7 @@ def built(output: Path, *arguments: str) -> dict[str, bytes]:
 # Solids take seconds, and the rule is the same for every folder.
 @pytest.mark.parametrize("only", sorted(PRODUCTS.keys() - {"mold", "mesh"}))
 def test_a_folder_holds_the_files_of_one_pattern(only: str, tmp_path: Path) -> None:
-    """Whatever one product is made of another pattern, nothing of the earlier pattern stays beside it."""
+    """After a build of one product from another pattern, no file of the earlier pattern remains."""
     first = ("--set", "layers=2", "--only", "svg,layout,preview,report,laser,print")
     other = ("--set", "layers=3", "--only", only)
     built(tmp_path / "mixed", *first)

@@ -1,4 +1,4 @@
-"""Image files: what is no color picture is one clear line; what is one comes as BGR."""
+"""Image files: a file that is no color picture gives one clear line; a color picture is read as BGR."""
 
 from __future__ import annotations
 
@@ -223,7 +223,9 @@ def test_damaged_files_are_read_or_refused(kind: str, tmp_path: Path) -> None:
 
 
 def test_a_png_of_few_bytes_claims_few_pixels(tmp_path: Path) -> None:
-    """Within the limit, but more than its bytes can hold; the most that deflate makes of a byte is read."""
+    """A size within the limit, but too large for the bytes of the file, is refused; the largest ratio of deflate is
+    read.
+    """
     (tmp_path / "claims.png").write_bytes(png(15_000, 15_000))
     with pytest.raises(ImageFileError, match="claims 15000 x 15000 px"):
         read_image(tmp_path / "claims.png")

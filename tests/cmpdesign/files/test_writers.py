@@ -1,4 +1,6 @@
-"""Every writer: a kill in the middle leaves the earlier file whole, and no unfinished file has a name to be guessed."""
+"""Every writer: after a kill in the middle the earlier file is complete, and names of unfinished files cannot be
+predicted.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever stands in a file that the project reads: it is read, or refused by the project's own error, at once."""
+"""A file with any content is read, or refused within a second by an error of the project."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def at_once() -> Iterator[None]:
 
 
 def answer(kind: InputFile, path: Path) -> str | None:
-    """The line that the file is refused with; None if it is read."""
+    """The message that refuses the file; None if the file is read."""
     try:
         with at_once():
             kind.read(path)
@@ -199,7 +199,7 @@ def test_odd_names_of_fields_are_refused(name: str, tmp_path: Path) -> None:
 
 
 def leaves(value: Any, holder: Any = None, key: Any = None) -> Iterator[tuple[Any, Any, Any]]:
-    """Values that hold no others, with what holds them; of a list the first two entries."""
+    """Values without parts, with their containers; of a list, the first two entries."""
     if isinstance(value, dict):
         for inner, item in value.items():
             yield from leaves(item, value, inner)

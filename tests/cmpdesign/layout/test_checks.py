@@ -1,4 +1,4 @@
-"""Each check finds what it is for, with value, limit, unit and remedy; a sound design has no finding."""
+"""Each check finds its fault, with value, limit, unit and remedy; a correct design has no finding."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What is made is what is read: written molds are sliced, written programs replayed, and the pads are read.
+"""Pads rebuilt from written files are read: molds are sliced, and programs of lasers are replayed.
 
-Nothing here uses what the products predict, but for the tests of the prediction itself.
+No test uses the products' predictions, except for the tests of the predictions.
 """
 
 from __future__ import annotations

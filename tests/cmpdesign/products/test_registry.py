@@ -1,4 +1,4 @@
-"""The registry of products: choosing, making, and what a product tells the report and the user."""
+"""The registry of products: choosing, making, and the lines of a product in the report and in messages."""
 
 from __future__ import annotations
 
@@ -66,7 +66,8 @@ def test_pictures_of_a_product_are_shown_in_the_preview(monkeypatch: pytest.Monk
     """Beside and below the pattern's drawing, which stays as it is; the preview comes with them, unasked."""
     tall, wide = np.zeros((400, 200, 3), np.uint8), np.full((200, 400, 3), (0, 0, 255), np.uint8)
     module = ModuleType("camera")
-    module.make = lambda design, layout: ProductFiles({"a.txt": ""}, pictures={"tall": tall, "wide": wide})  # type: ignore[attr-defined]
+    # type: ignore[attr-defined]
+    module.make = lambda design, layout: ProductFiles({"a.txt": ""}, pictures={"tall": tall, "wide": wide})
     monkeypatch.setitem(sys.modules, "camera", module)
     monkeypatch.setattr(products, "PRODUCTS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
     files, _ = make("camera")

@@ -33,7 +33,9 @@ def test_the_design_fits_the_view_and_has_no_finding(camera: str, view: str, err
 def test_the_error_that_is_measured_is_the_predicted_one(
     camera: tuple[int, int], view: tuple[float, float], noise: float
 ) -> None:
-    """Within 12 % for the inner markers, and within 25 % in the outermost layer, of 12 turned pictures."""
+    """In 12 turned pictures, the estimate is within 12 % for the inner markers, and within 25 % in the outermost
+    layer.
+    """
     proposal = cmpdesign.size(camera, view, noise=noise)
     layout = proposal.design.layout
     # A turned pattern needs a larger picture; the scale stays that of the view.
@@ -67,7 +69,7 @@ def test_a_wanted_error_is_met_by_the_finest_such_design() -> None:
 
 
 def test_a_period_above_the_stated_distance_is_resolved_in_every_direction() -> None:
-    """No other wave of the same samples is longer, so that the markers tell the wave that is there."""
+    """No other wave of the same samples is longer, so that the markers determine the wave."""
     proposal = cmpdesign.size("640x480", "40x30mm")
     layout, limit_mm = proposal.design.layout, proposal.told_apart_mm
     around = layout.marker_xy_mm[1:7]  # of marker 0; two of them span the lattice

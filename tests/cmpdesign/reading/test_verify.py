@@ -18,7 +18,7 @@ from tests.support.verdicts import LAYERS, markers_at, picture, reference
 
 
 def turned(sixths: int) -> NDArray[np.int64]:
-    """Ids of the markers that stand where the numbering would be turned by some sixths."""
+    """Ids of the markers at the positions of a numbering that is turned by some sixths."""
     layer, index = reference().layer.astype(np.int64), reference().index.astype(np.int64)
     return np.where(
         layer > 0, 3 * layer * (layer - 1) + 1 + (index + sixths * layer) % np.maximum(6 * layer, 1), 0
@@ -127,7 +127,9 @@ def test_a_share_is_a_share(share: float) -> None:
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
 @pytest.mark.parametrize(("seen", "given"), [(5, 3), (3, 5)])
 def test_a_pattern_of_other_layers_is_named(pattern: str, seen: int, given: int) -> None:
-    """Not as a lost white cell: more layers hide it from the search, and fewer leave the rim unseen."""
+    """The reason is not a lost white cell: with more layers the search does not find the cell, with fewer the rim is
+    unseen.
+    """
     image = render(Scene(layout=small_layout(pattern, seen), camera=Camera(30, 7)), size=(480, 400)).image
     layout = parse_layout(small_text("honeycomb", given))
     verdict = verify(Extractor(layout), layout, image)

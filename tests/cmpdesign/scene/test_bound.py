@@ -111,7 +111,7 @@ def beside(layout: Layout, edge: np.ndarray) -> np.ndarray:
 
 
 def test_saturated_cells_tell_nothing() -> None:
-    """Where even black is clipped, nothing but the prior of 1000 px is left."""
+    """Where black is clipped, too, only the prior of 1000 px remains."""
     scene = replace(standard_with("linear", layout=standard_layout(layers=1)), camera=Camera(60))
     for bound in (cramer_rao, exact_bound):
         for gain, px in ((13.0, 1000.0), (1.0, 0.005)):
@@ -138,7 +138,7 @@ def test_a_marker_alone_matches_the_derivative_of_the_image(
 ) -> None:
     """With all other markers known, the information on one is the rendered image's squared derivative.
 
-    Where edges meet, within the blur of a corner, they share pixels and tell less: a few per cent here.
+    Edges share pixels within the blur of a corner, and give less information: here by a few per cent.
     """
     layout = standard_layout(layers=2)
     camera, size, step_px = Camera(pitch_px=160), (700, 600), 0.2

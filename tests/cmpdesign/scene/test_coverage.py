@@ -60,7 +60,7 @@ def quadrature(points: Points, blur_px: float, size: tuple[int, int]) -> Points:
 
 
 def edge_response(distance: Points, blur_px: float) -> Points:
-    """Integral of ``box_gaussian`` from -inf: what a pixel ``distance`` inside a half plane shows."""
+    """Integral of ``box_gaussian`` from -inf: the value of a pixel ``distance`` inside a half plane."""
 
     def ramp(z: Points) -> Points:
         return z * ndtr(z) + np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
@@ -160,7 +160,7 @@ def test_chords_stay_on_the_curve() -> None:
 
 
 def test_the_reference_itself() -> None:
-    """The quadrature that the tests trust gives the closed form for a half plane."""
+    """The quadrature of the tests gives the closed form for a half plane."""
     points = np.array([[6.3, -60.0], [90.0, -60.0], [90.0, 60.0], [6.3, 60.0]])
     seen = quadrature(points, 1.3, (20, 1))[0]
     x = np.arange(20) - 6.3

@@ -1,4 +1,4 @@
-"""Surfaces that turn away from the camera: what hides what, against points thrown into a depth buffer."""
+"""Surfaces that turn away from the camera: hidden parts, against points in a depth buffer."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_a_blur_spreads_what_was_corrected_without_loss(steep: Scene) -> None:
 
 
 def test_dirt_and_bleeding_inks_are_hidden_like_all_else(steep: Scene) -> None:
-    """What a blob paints on the nearest part alone: a blob under everything paints all that is seen, in its color."""
+    """A blob paints the nearest part alone: a blob under the whole surface paints all visible parts in its color."""
     everywhere = Damage(blobs=(Blob((0.0, 0.0), 5.0, (90, 80, 70)),))
     drawn = render(replace(steep, damage=everywhere), size=SIZE).image[WINDOW].astype(int)
     np.testing.assert_allclose(drawn - (70, 80, 90), 0, atol=1)

@@ -1,4 +1,4 @@
-"""Scenes through a window and a gel: rays by Snell's law, the limits of air, what the extractor sees, bad values."""
+"""Scenes through a window and a gel: rays by Snell's law, the limits of air, the extractor's result, bad values."""
 
 from __future__ import annotations
 
@@ -118,14 +118,14 @@ def test_the_extractor_projects_what_the_scene_draws(mirror: bool) -> None:
 
 
 def found_px(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What the extractor reads of the scene's markers, and their true places."""
+    """The positions of the scene's markers by the extractor, and their true positions."""
     drawn = render(scene, size=SIZE)
     markers = Extractor(parse_layout(small_text("honeycomb", 6)), side="either").extract(drawn.image)
     return markers.xy_px[drawn.truth.visible], drawn.truth.marker_xy_px[drawn.truth.visible]
 
 
 def test_pictures_are_where_their_truth_is() -> None:
-    """The drawing itself goes through the medium, gridlines included: what is read of it lies at the truth."""
+    """The whole drawing, gridlines included, is seen through the medium: read positions agree with the truth."""
     scene = Scene(
         small_layout("honeycomb", 6),
         CAMERAS[0],

@@ -1,4 +1,6 @@
-"""Scenes: the image agrees with its truth, every part does what it says, same scene, same bytes."""
+"""Scenes: the image agrees with its truth, every part has the stated effect, and the same scene gives the same
+bytes.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,7 @@ def layout() -> Layout:
 
 @pytest.fixture(scope="module")
 def small(layout: Layout) -> Scene:
-    """Large cells, 16 bits of light, no noise: what is measured on it is the renderer's own error."""
+    """Large cells, 16 bits of light, no noise: the measured error is the renderer's error."""
     camera = Camera(pitch_px=60, rotation_deg=3)
     return Scene(layout, camera, optics=Optics(1.0), sensor=Sensor(bits=16, response="linear"), inks=INKS)
 
@@ -62,7 +64,8 @@ def small(layout: Layout) -> Scene:
 def edge_on_rows(image: NDArray[np.uint16], at: Points, reach: int) -> Points:
     """Where a steep edge crosses the rows nearest to the points ``at`` (N, 2) px, by integrated profiles.
 
-    Blur and pixel boxes leave the integral of an edge's profile as it is, so nothing here knows the renderer.
+    Blur and pixel boxes do not change the integral of an edge's profile, so the function uses no property of the
+    renderer.
     """
     found = []
     for x, y in at:

@@ -1,4 +1,4 @@
-"""Scene files: what they compose and refuse, sequences, and that what is absent costs nothing."""
+"""Scene files: composed scenes, refused values, sequences, and absent parts, which take no time."""
 
 from __future__ import annotations
 
@@ -291,7 +291,8 @@ def test_a_contact_is_pressed_into_the_surface(written, layout: Layout) -> None:
     assert deep.warnings and render(deep, size=SIZE).warnings == deep.warnings
 
 
-def test_a_pattern_below_the_touched_surface_moves_as_the_layer_does_there(written, layout: Layout) -> None:  # type: ignore[no-untyped-def]
+# type: ignore[no-untyped-def]
+def test_a_pattern_below_the_touched_surface_moves_as_the_layer_does_there(written, layout: Layout) -> None:
     from cmpdesign.contact import Ball, Elastomer, Motion, solve
 
     deep = Elastomer(2, 0.2, marker_depth_mm=0.5)
@@ -325,7 +326,8 @@ def test_a_moving_contact_remembers_its_way(written, layout: Layout) -> None:  #
         list(written(away).scenes())
 
 
-def test_an_unmoved_contact_is_solved_once(written, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
+# type: ignore[no-untyped-def]
+def test_an_unmoved_contact_is_solved_once(written, monkeypatch: pytest.MonkeyPatch) -> None:
     from cmpdesign.contact.table import ContactSetup
 
     calls: list[int] = []
@@ -403,7 +405,7 @@ def test_every_template_draws(name: str) -> None:
 
 
 def test_the_binocular_is_one_camera_before_two_mirrors() -> None:
-    """The template's numbers are what the mirrors of its comment make of its camera."""
+    """The template's numbers follow from the camera and the mirrors of its comment."""
     file = load_scene(scene_templates()["tac3d-binocular"], standard_layout(layers=1))
     views = file.scene().camera
     assert isinstance(views, tuple) and len({(v.focal_px, v.centre_px, v.distortion) for v in views}) == 1

@@ -141,7 +141,7 @@ def test_a_flat_surface_in_space_is_the_flat_picture(layout: Layout) -> None:
 
 
 def test_a_dent_moves_away_from_a_camera_before_it(layout: Layout) -> None:
-    """Seen from the front, pressed points recede: they come closer to the point that the camera looks at."""
+    """Pressed points recede in a view from the front: the points come closer to the point that the camera looks at."""
     surface = composed(Dent(2.0, 1.0))
     for back, sign in ((False, -1), (True, 1)):
         camera = Pinhole.looking(SIZE, distance_mm=12, field_of_view_deg=40, back=back)

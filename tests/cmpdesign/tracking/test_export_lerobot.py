@@ -152,12 +152,12 @@ def test_lost_markers_are_nan_and_statistics_know_it(made: Path, tmp_path: Path)
     ("words", "expected"),
     [
         (("layout.json",), "layout.json: unknown ending; expected .npz"),
-        (("truth.npz",), "truth.npz: is no run"),
+        (("truth.npz",), "truth.npz is no run"),
         (("missing.npz",), "cannot be read"),
         (("a.npz", "--images", "video.avi", "--images", "video.avi"), "--images is given 2 times for 1 runs"),
         (("a.npz", "--images", "short"), f"has 1 of the {FRAMES} frames"),
         (("a.npz", "--fps", "-1"), "--fps is -1"),
-        (("a.npz", "other.npz"), "its digest is"),
+        (("a.npz", "other.npz"), "the digest is"),
     ],
 )
 def test_bad_input_is_one_line_and_no_folder(
@@ -212,7 +212,7 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def lerobot_python(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """An interpreter with lerobot, in an environment of its own of some GB; skips where it cannot be installed."""
+    """An interpreter with lerobot, in a separate environment of some GB; skips where it cannot be installed."""
     if given := os.environ.get(PYTHON_VARIABLE):
         yield given
         return

@@ -55,7 +55,7 @@ def recorded(path: Path) -> Received:
 
 
 def shown(output: Path, *command: object) -> tuple[Received, str]:
-    """What a client gets from a command that records into ``output``, and what the command prints."""
+    """The messages of a client during a command that records into ``output``, and the printed text of the command."""
     port, texts = free_port(), []
 
     def follow() -> None:
@@ -110,7 +110,9 @@ def resident_mb() -> float:
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc to read the memory in use")
 def test_a_client_that_does_not_read_costs_neither_memory_nor_time() -> None:
-    """What waits for it is bounded, the oldest is left out, and it is said; it gets the newest when it reads again."""
+    """The client's queue is bounded, the oldest frames are left out with a message, and the client gets the newest
+    frame.
+    """
     place = ImagePlace("tactile", ())
     server = FoxgloveServer("tactile", free_port(), [place])
     markers, received = np.zeros(331, IN_IMAGE), Received()
@@ -151,7 +153,7 @@ def test_only_this_machine_can_connect() -> None:
 
 
 class Stuck:
-    """A server that takes its first frames, and no others before ``go``."""
+    """A server that accepts the first frames, and no others before ``go``."""
 
     address = "nowhere"
 

@@ -1,4 +1,4 @@
-"""How far below the touched surface the pattern lies: what a rig file says of it."""
+"""The pattern's depth below the touched surface, by a rig file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_depth_is_what_the_file_says(text: str, depth_mm: float | None, tmp_path
 
 
 def test_shipped_sensors_say_it() -> None:
-    """Where the pattern lies is part of a sensor's stack: between the touched surface and the support."""
+    """The pattern's depth is part of a sensor's stack: between the touched surface and the support."""
     for path in sorted((templates_folder() / "sensors").glob("*.toml")):
         assert 0.5 <= (read_marker_depth_mm(path) or 0) <= 1.0, path.name
 

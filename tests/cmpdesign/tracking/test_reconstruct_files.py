@@ -263,7 +263,7 @@ def test_given_poses_are_kept_or_found_again(made: Path, tmp_path: Path) -> None
     [
         ("missing.toml", "0", (), "missing.toml: cannot be read"),
         ("one.toml", "0", (), "the rig has 1 view; depth needs two or more"),
-        ("twins.toml", "0", (), "stand too near to each other to tell depth"),
+        ("twins.toml", "0", (), "stand too near to each other to measure depth"),
         ("large.toml", "0", (), "reaches beyond the image of 960 x 360 px"),
         ("mirror.toml", "0", (), "check which views are mirrored"),
         ("rig.toml", "9", (), "has fewer frames"),

@@ -52,7 +52,7 @@ def read_messages(path: Path) -> Messages:
 
 
 def points_of(message: Any) -> np.ndarray:
-    """The points by what the message itself says of its bytes."""
+    """The points, decoded by the message's description of its bytes."""
     cloud = message.decoded_message
     kind = {
         "names": [field.name for field in cloud.fields],

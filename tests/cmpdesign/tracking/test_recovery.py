@@ -1,4 +1,4 @@
-"""What killed runs and damaged disks leave of a table: every whole frame is kept, and what is not is named."""
+"""Tables after killed runs and damage on disk: every complete frame is kept, and lost frames are named."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def killed(layout: Path, frames: int, *outputs: Path) -> None:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a layout and what a killed run leaves of a table of every kind."""
+    """A folder with a layout, and the remains of a killed run's table of every kind."""
     folder = tmp_path_factory.mktemp("killed")
     (folder / "layout.json").write_text(small_text("honeycomb", LAYERS), encoding="utf-8")
     killed(folder / "layout.json", FRAMES, *(folder / f"a.{kind}" for kind in KINDS))
@@ -65,7 +65,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def left(made: Path, folder: Path, kind: str) -> Path:
-    """The table of a killed run in a folder of its own; the pieces lie beside it."""
+    """The table of a killed run in a separate folder, with the pieces beside the table."""
     source, target = made / f"a.{kind}.part", folder / f"a.{kind}.part"
     (shutil.copytree if source.is_dir() else shutil.copy)(source, target)
     return folder / f"a.{kind}"
@@ -91,7 +91,7 @@ def frames_of(path: Path) -> list[int]:
 
 
 def recover(made: Path, table: Path) -> tuple[list[int], str]:
-    """The frames after a recovery, and what it warned of."""
+    """The frames after a recovery, and its warnings."""
     result = run("track", made / "layout.json", "frames", "-o", table, "--recover")
     assert result.exit_code == 0, result.output
     frames = frames_of(table)
@@ -211,7 +211,7 @@ def recover_alone(made: Path, folder: Path) -> list[int]:
 
 
 def test_a_run_killed_before_its_first_frame(made: Path, tmp_path: Path) -> None:
-    """The recovery says so and leaves a clean place; another run needs no recovery."""
+    """The recovery prints a message and removes the remains; another run needs no recovery."""
     tables = [tmp_path / f"{name}.{kind}" for kind in KINDS for name in "ab"]
     killed(made / "layout.json", 0, *tables)
     for recovered, table in zip(tables[::2], tables[1::2], strict=True):

@@ -79,7 +79,7 @@ def test_a_tracked_run_is_read_back_bit_for_bit(made: Path, tmp_path: Path) -> N
 
 
 def test_a_reconstructed_run_is_read_back_bit_for_bit(tmp_path: Path) -> None:
-    """The third frame is lost: its markers are there, and NaN, and an error says why."""
+    """The third frame is lost: its markers are NaN, and an error gives the reason."""
     press = write_press(tmp_path)
     for name in ("a.npz", "a.rrd"):
         command = ("reconstruct", press / "layout.json", press / "rig.toml", "0", press / "frames")

@@ -105,7 +105,7 @@ def test_a_camera_that_stops(made: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_cameras_own_time_stamps(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a clock of its own; a stamp that does not go on, or is long before the arrival, does not count."""
+    """Time by the source's clock; a stamp that does not increase, or is long before the arrival, is ignored."""
     stamps_ms = [7e6, 7e6 + 40, 7e6 + 80, 7e6 + 80, 5.0, 7e6 + 210]
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: StoppingCamera(made / "frames", 6, stamps_ms))
     monkeypatch.setattr("time.monotonic", iter([100 + 0.05 * k for k in range(40)]).__next__)
@@ -157,7 +157,7 @@ def test_a_stream_is_read_by_its_address(made: Path, tmp_path: Path) -> None:
 
 def test_an_address_is_said_as_it_was_given(made: Path, tmp_path: Path) -> None:
     address = "rtsp://127.0.0.1:9/live"
-    assert f"stream {address} cannot be opened; is the address right" in refused(
+    assert f"stream {address} cannot be opened; check the address" in refused(
         "track", made / "layout.json", address, "-o", tmp_path / "a.npz"
     )
 

@@ -1,4 +1,4 @@
-"""``cmpdesign track`` on real files: its tables agree, and what was tracked survives whatever ends a run."""
+"""``cmpdesign track`` on real files: its tables agree, and tracked frames are kept for any end of a run."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@ INKS = ((45, 50, 200), (60, 150, 40), (190, 60, 45))  # BGR
 @pytest.mark.parametrize("radius_px", [15, 25, 45, 70])
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
 def test_cells_beside_large_blots_are_read(pattern: str, radius_px: int) -> None:
-    """Of the pattern's own inks, all around it. Those as large as some cells may hide where its outline is; the white
-    paper between them could be white cells then, and nothing is said."""
+    """Blots of the pattern's inks around the pattern. Blots as large as some cells may hide the outline; the white
+    paper between the blots could then be white cells, and no marker is numbered."""
     seen = scene_of(small_layout(pattern, 5), pitch_px=18.0, size=(480, 400))
     image, true = seen.image.copy(), seen.truth.marker_xy_px
     middle = true.mean(axis=0)

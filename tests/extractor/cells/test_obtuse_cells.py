@@ -15,7 +15,7 @@ LAYERS, PITCH_PX = 9, 20.0
 
 @pytest.mark.parametrize("pattern", ["round", "elliptical"])
 def test_rim_markers_of_obtuse_cells_are_measured(pattern: str) -> None:
-    """sRGB pictures, where domains look larger than cells: the first places are near, and no marker is lost."""
+    """In sRGB pictures, domains are larger than cells: the first positions are near, and no marker is lost."""
     error_px = []
     for turn_deg in range(0, 360, 30):
         camera = Camera(PITCH_PX, turn_deg)

@@ -1,6 +1,6 @@
 """Stages 3 and 4 alone: seeds, and growing against plain eq. 3.
 
-Inside: triangles are fitted to edges, wherever growing ended, so that markers do not show whether eq. 3 holds.
+Inside: triangles are fitted to edges for any end of the growing, so that markers do not show errors of eq. 3.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Cells that bled or are overexposed overlap: what meets in the pattern still meets, and no block is dropped."""
+"""Bled or overexposed cells overlap: cells with a common corner keep the corner, and no block is dropped."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ def test_what_is_no_triangle_is_dropped(shape: str) -> None:
 
 
 def test_a_triangle_without_contrast_is_dropped() -> None:
-    """Its pixels say triangle, the image shows nothing there."""
+    """The labels form a triangle, and the image has no edge there."""
     corners = np.array([[12.0, 40.0], [32.0, 10.0], [50.0, 42.0]])
     flat = np.full((64, 64, 3), 60, np.uint8)
     assert len(fit_triangles(view_of(flat), region_of(coverage(corners, 64) > 0.5)).ink) == 0

@@ -1,4 +1,4 @@
-"""Markers that are not shown, on surfaces that are flat or bent: repaired where what is around them says, else lost."""
+"""Hidden markers on flat or bent surfaces: repaired where the surroundings determine the position, else lost."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ONE, GAPS, RING = [0], [0, 1, 3, 5], [0, 1, 2, 3, 4, 5, 6]  # markers whose cell
 
 
 def twisted(turn: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """A surface turned the more the nearer to the middle (rad): what lies there is odd about marker 0."""
+    """A surface turned by an angle (rad) that grows towards the middle; the surface is odd about marker 0."""
 
     def surface(xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         x, y = xy_mm.T

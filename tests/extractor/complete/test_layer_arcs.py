@@ -1,6 +1,6 @@
 """A layer's quadratic against numpy's.
 
-Inside: the place of a fitted marker is a mean with what its neighbours say, of which an image shows the result only.
+Inside: the position of a fitted marker is a mean with its neighbours' estimate; an image shows the mean alone.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from extractor.complete.layer_arcs import predict_by_layer
 
 
 def test_a_layers_quadratic_is_numpys() -> None:
-    """In layer 8, sextant 2: markers off a quadratic by noise, three of them lost; the others as polyfit has them."""
+    """Layer 8, sextant 2: markers on a quadratic with noise, three of them lost; the result agrees with polyfit."""
     rng = np.random.default_rng(1)
     ids, step = 3 * 8 * 7 + 1 + np.arange(16, 25), np.linspace(-1, 1, 9)
     xy = np.full((397, 2), np.nan)

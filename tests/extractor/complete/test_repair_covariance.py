@@ -1,5 +1,5 @@
-"""Where something is damaged, covariances cover the true errors: of repaired and fitted markers, and of measured ones
-beside the damage (Monte Carlo over damaged scenes)."""
+"""Covariances of repaired and fitted markers, and of measured markers beside damage, cover the true errors (Monte
+Carlo over damaged scenes)."""
 
 from __future__ import annotations
 

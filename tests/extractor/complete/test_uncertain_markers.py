@@ -1,4 +1,4 @@
-"""Markers that dirt leaves uncertain: what their neighbours say is weighed against what they show themselves."""
+"""Uncertain markers beside dirt: the estimate of the neighbours is weighted against the measurement."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ DROPS = Damage(blobs=tuple(Blob(at, 0.45, BLACK_RGB) for at in PLACES))
     ("pattern", "limit_px"), [("honeycomb", 0.09), ("round", 0.26), ("elliptical", 0.09)]
 )
 def test_under_dirt_others_help(pattern: str, limit_px: float, preset: str) -> None:
-    """Drops on a pressed pattern: without the neighbours, the errors of markers under them are more than twice as
-    large. They are as near as their covariances say."""
+    """Drops on a pressed pattern: without the neighbours, the errors of markers under drops are more than twice as
+    large. The errors agree with the covariances."""
     away = np.linalg.norm(standard_layout(pattern, LAYERS).marker_xy_mm[:, None] - np.array(PLACES), axis=2)
     near, error, normalised = away.min(axis=1) < 1.2, [], []
     for seed in range(3):

@@ -1,6 +1,6 @@
 """Stages 1 and 2 alone: colors, the hues found in the image, the target area, labels, noise.
 
-Inside: regions grow beyond their labels and gridlines are measured without hues, so that markers hide what is wrong.
+Inside: regions grow beyond their labels, and gridlines are measured without hues, so that markers do not show errors.
 """
 
 from __future__ import annotations
@@ -81,7 +81,9 @@ def test_without_one_of_the_inks_there_are_no_hues() -> None:
 
 @pytest.mark.parametrize("strongest", [60, 130, 255])
 def test_hues_weigh_what_is_not_pale(strongest: int) -> None:
-    """All but 2 % of the colored pixels have less chroma than what counts as strong; an eighth of that is pale."""
+    """All but 2 % of the colored pixels have less chroma than the limit of strong pixels; an eighth of the limit is
+    pale.
+    """
     rng = np.random.default_rng(strongest)
     hue = rng.integers(0, 180, (70, 90)).astype(np.uint8)
     chroma = rng.integers(0, strongest + 1, hue.shape).astype(np.uint8)

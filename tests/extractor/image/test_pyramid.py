@@ -57,7 +57,7 @@ def test_a_reduced_image_has_the_mean_light(scale: int, size: tuple[int, int], r
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("response", ["srgb", "linear", 0.45, 2.2])
 def test_what_is_flat_keeps_its_values(scale: int, response: Response) -> None:
-    """Of an exponent of 2.2, the values 1 and 2 have less than half a step of light."""
+    """At an exponent of 2.2, the values 1 and 2 have less than half a step of light."""
     values = np.arange(256, dtype=np.uint8)
     values[1:3] = 0 if response == 2.2 else values[1:3]
     image = np.repeat(np.repeat(values[None, :, None], scale, axis=1), scale, axis=0).repeat(3, axis=2)

@@ -1,4 +1,4 @@
-"""The response: from values to light and back, and what the reader refuses.
+"""The response: from values to light and back, and refused responses.
 
 Inside: a table that is wrong by one value moves markers by less than their noise.
 """
@@ -94,7 +94,7 @@ def test_more_light_has_a_larger_value(response: Response, light: list[float]) -
 
 @given(responses(), st.floats(0, 255))
 def test_the_tables_hold_the_light_and_the_values(response: Response, root: float) -> None:
-    """The place of light is half an entry away at most; the value there lies between those of the entries around."""
+    """The position of light is at most half an entry away; the value lies between the values of the entries around."""
     light_of_value = light_of_values(response)
     tables = response_tables(light_of_value)
     np.testing.assert_allclose(tables.light, light_of_value, rtol=1e-6)
@@ -167,6 +167,6 @@ def test_what_is_no_response_is_refused(response: Any, message: str) -> None:
 
 
 def test_none_is_no_response_of_a_table() -> None:
-    """The extractor's None stands for two responses, one for each depth."""
+    """None means two responses for the extractor, one for each depth."""
     with pytest.raises(ValueError, match=f"response is None; {NAMES}"):
         light_of_values(None)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The reader of layout.json: what the writer writes is read, and whatever is wrong is one clear line."""
+"""The reader of layout.json: written files are read, and every fault gives one clear line."""
 
 from __future__ import annotations
 
@@ -285,7 +285,7 @@ PATHS = {pattern: paths(small_document(pattern)) for pattern in ("honeycomb", "s
 
 
 def read_or_refused(text: str) -> None:
-    """The reader's whole promise; and it never reads what the schema forbids."""
+    """Every document is read or refused; a document that the schema forbids is never read."""
     try:
         reference = parse_layout(text)
     except LayoutError as error:

@@ -1,4 +1,4 @@
-"""What is loaded can be read with: layouts that the reader's tables cannot hold are refused, by stated limits."""
+"""Layouts beyond the capacity of the reader's tables are refused, with the limits; other layouts can be read."""
 
 from __future__ import annotations
 
@@ -94,7 +94,8 @@ def test_what_is_loaded_can_be_used(data: st.DataObject, pattern: str) -> None:
                 place = data.draw(st.integers(1, len(document["cells"]["corners"]) - 1))
                 del document["cells"]["corners"][place], document["cells"]["color"][place]
             case "edge":
-                document = with_edges(document, tuple(sorted((data.draw(marker), data.draw(marker)))))  # type: ignore[arg-type]
+                # type: ignore[arg-type]
+                document = with_edges(document, tuple(sorted((data.draw(marker), data.draw(marker)))))
             case "drop edge":
                 del document["edges"][data.draw(st.integers(0, len(document["edges"]) - 1))]
             case "move":

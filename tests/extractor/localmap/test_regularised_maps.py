@@ -1,6 +1,6 @@
-"""Maps where rings are not whole: for many markers at once what they are for one.
+"""Maps at incomplete rings: the maps of many markers at once equal the maps of single markers.
 
-Inside: which neighbours an image leaves a marker cannot be chosen one by one, and least squares by numpy can.
+Inside: an image does not allow a choice of each neighbour, and least squares by numpy does.
 """
 
 from __future__ import annotations

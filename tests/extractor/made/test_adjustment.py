@@ -98,7 +98,7 @@ def test_residuals_say_how_wrong_the_stated_covariances_are() -> None:
 
 
 def test_the_homographies_of_the_pictures_do_not_matter() -> None:
-    """Readings of any other view of the same tell the same places, when their covariances are those of that view."""
+    """Readings of another view of the pad give the same positions, if the covariances are of this view."""
     readings, _ = sample(4)
     h = np.array([[0.8, 0.3, 5.0], [-0.4, 1.1, 9.0], [1e-4, -2e-4, 1.0]])
     px = np.nan_to_num(readings.xy_px)

@@ -126,7 +126,7 @@ def test_a_marker_that_no_picture_shows_stays_at_its_nominal_place() -> None:
 
 
 def test_a_pad_seen_from_the_back_is_learnt_in_the_layouts_frame() -> None:
-    """The mirror image of the pad turned over shows what its back shows."""
+    """The mirror image of the pad turned over equals the picture of the pad's back."""
     mirrored = [np.ascontiguousarray(image[:, ::-1]) for image in rest_images()]
     found = learn_layout(reference(nominal_layout()), mirrored, side="back")
     assert found.layout.as_made is not None and found.layout.as_made.side == "back"
@@ -160,7 +160,7 @@ def test_what_cannot_be_learnt_from_is_told() -> None:
 
 
 def test_pictures_of_another_pattern_are_told() -> None:
-    """Of another number of layers, and of the same graph with other places."""
+    """A layout with another number of layers, and a layout of the same graph with other positions."""
     assert "check the layout" in told(rest_images(), parse_layout(small_text("honeycomb", 2)))
 
 

@@ -1,4 +1,4 @@
-"""Across gaps and beside dirt: what is numbered there is right, and no dirt is the white cell."""
+"""Across gaps and beside dirt: ids are correct, and no dirt is taken for the white cell."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def read(frame: PatternFrame) -> MarkerScore:
 )
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_a_part_beyond_a_gap_is_numbered_no_step_aside(pattern: str, width: float, least: float) -> None:
-    """Two gaps, in edges, cut the pattern into three parts: numbered as those of their ink a step farther, the outer
-    ones fit themselves. What is between is stretched, turned or pressed; narrow scratches cut cells to pieces, too."""
+    """Two gaps, in edges, cut the pattern into three parts: the outer parts also agree with the ids one lattice step
+    farther. The part between is stretched, turned or pressed; narrow scratches also cut cells to pieces."""
     y = 2.5 + width / 2
     gaps = (
         Scratch((-14.0, y + 0.5), (14.0, y + 1.5), width, BLACK_RGB),
@@ -87,7 +87,7 @@ def test_cells_in_a_row_beside_a_hole_have_corners(pattern: str) -> None:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_cells_that_touch_by_corners_are_numbered(pattern: str) -> None:
-    """Three of ten cells missing, at random: the mesh falls to pieces, but corners hold together."""
+    """Three of ten cells are missing, at random: the mesh is disconnected, but cells still share corners."""
     figures = [read(plain_frame(pattern, seed).damaged(missing_share=0.3)) for seed in (3, 4, 5)]
     assert all(one.wrong == 0 for one in figures)
     assert sum(one.kept for one in figures) >= 0.99 * sum(one.sure for one in figures)

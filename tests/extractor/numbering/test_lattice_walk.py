@@ -99,8 +99,7 @@ def test_a_scratch_across_shifts_no_number(offset_mm: float) -> None:
 
 @pytest.mark.parametrize("pattern", TRIANGULAR)
 def test_missing_cells_and_cells_of_a_wrong_ink_shift_no_number(pattern: str) -> None:
-    """At any rotation, from either side: every number given is the layout's own, and few cells are not enough to
-    prevent it."""
+    """At any rotation, from either side: every id is the layout's id, also in a picture of few cells."""
     layout, shares = small_layout(pattern, 5), []
     colored = np.flatnonzero(layout.cell_color < BLACK)
     for seed in range(12):

@@ -1,6 +1,6 @@
-"""What hues say of an image that shows the other side.
+"""The decision by hues on an image of the other side.
 
-Inside: light moves the hues of all inks together, which no picture that is read or refused shows by itself.
+Inside: light moves the hues of all inks together, which is not visible in the result of a single picture.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from extractor.numbering.other_side import reason_by_hues
 
 
 def test_other_hues_leave_the_cause_open() -> None:
-    """In light that moves hues, neither side nor channels are named alone."""
+    """In light that moves hues, the reason names neither the side nor the channels alone."""
     palette = np.array([2.0, 131.0, 234.0])
 
     def inks(hues_deg: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Where the white cell is hidden, the outline leaves one way to number the cells."""
+"""The outline determines the numbering if the white cell is hidden."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LAYERS = 7
 @pytest.mark.parametrize("missing", [0, 12])
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
 def test_the_outline_leaves_one_way(pattern: str, missing: int) -> None:
-    """Whatever the turn, from either side, and though inner cells are missing."""
+    """At any rotation, from either side, with missing inner cells."""
     layout = small_layout(pattern, LAYERS)
     white = int(np.flatnonzero(layout.cell_color == WHITE)[0])
     inner = np.flatnonzero(

@@ -45,7 +45,7 @@ def test_a_small_pattern_amid_much_else_is_read_as_if_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", AMID)
 def test_what_is_not_whole_is_read_too(name: str) -> None:
-    """A cell or some are gone: only what was shown by them is repaired."""
+    """One or several cells are missing: only the markers of these cells are repaired."""
     shot, by = shot_of(name), cached_extractor(name.split("/")[1], 11)
     x, y = shot.truths[0].marker_xy_px[40]
     image = shot.image.copy()
@@ -70,7 +70,7 @@ def test_fragments_between_scratches_are_no_small_cells() -> None:
 def test_no_cell_is_missed_however_small_it_looks_at_a_reduced_scale(
     pattern: str, pitch_px: float, tilt_deg: float
 ) -> None:
-    """Of cells between those that every scale shows and those that the finest shows only, hardly one is lost."""
+    """Few cells are lost between the size visible at every scale and the size visible at the finest scale only."""
     frame = plain_frame(pattern, 1).with_camera(pitch_px=float(pitch_px), tilt_deg=float(tilt_deg))
     for missing in (0.0, 0.05):
         shot = frame.damaged(missing_share=missing).shoot()
@@ -79,6 +79,8 @@ def test_no_cell_is_missed_however_small_it_looks_at_a_reduced_scale(
 
 
 def test_what_a_reduced_scale_has_missed_is_read_at_a_finer_one() -> None:
-    """Scratches leave pieces of cells that only the finest scale takes for cells: a tenth of the markers."""
+    """Scratches leave pieces of cells, which only the finest scale takes for cells: a tenth of the markers is
+    concerned.
+    """
     figures = read_case(parse_case("random scratches/honeycomb/70210"), 1, timing=False)[0].score
     assert figures.wrong == 0 and figures.kept >= 0.96 * figures.sure

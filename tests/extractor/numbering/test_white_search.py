@@ -1,4 +1,4 @@
-"""The white cell is a cell: what is as white on a black one, but no triangle of its size, is not taken for it."""
+"""The white cell is a cell: a white area on a black cell that is no triangle of this size is not taken for the cell."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HALF_MM = 8.0
 
 
 def cropped(frame: PatternFrame) -> PatternFrame:
-    """So near that no outline is in view: the white cell alone tells."""
+    """The camera is so near that no outline is in view: only the white cell determines the numbering."""
     return frame.with_camera(pitch_px=46.0)
 
 

@@ -1,6 +1,6 @@
-"""The border between Python and the native loops: wrong arrays are refused by name, and nothing is converted.
+"""The interface between Python and the native loops: wrong arrays are refused by name, and no array is converted.
 
-Inside: the package's own calls hand over right arrays, and a converted copy would lose what is written to it.
+Inside: the package's calls pass correct arrays, and values written to a converted copy would be lost.
 """
 
 from __future__ import annotations

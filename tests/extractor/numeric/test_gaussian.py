@@ -1,4 +1,4 @@
-"""How much of a blurred wedge a pixel sees, against the bivariate normal distribution.
+"""The share of a blurred wedge in a pixel, against the bivariate normal distribution.
 
 Inside: the share has a closed form, and an image shows sums of many shares under noise.
 """
@@ -16,7 +16,7 @@ near = st.floats(-3.2, 3.2).filter(lambda z: abs(z) > 1e-3)
 
 
 def wedge(h: float, k: float, r: float) -> float:
-    """How often two normal deviates with the correlation r lie below h and k, by Owen's T."""
+    """Probability that two normal deviates with the correlation r are below h and k, by Owen's T."""
     root = np.sqrt(1 - r * r)
     apart = 0.5 if h * k < 0 else 0.0
     joint = owens_t(h, (k / h - r) / root) + owens_t(k, (h / k - r) / root)

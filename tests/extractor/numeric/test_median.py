@@ -14,7 +14,7 @@ from extractor.numeric.median import median_of, select
 
 @given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=24), st.integers(0, 3))
 def test_it_is_numpys(values: list[float], beyond: int) -> None:
-    """Equal numbers among them, and whatever stands behind them."""
+    """The numbers may be equal, and other values may follow in the array."""
     own = np.array([*values, values[0], *[np.nan] * beyond])
     assert median_of(own, len(values) + 1) == np.median(own[: len(values) + 1])
 

@@ -25,7 +25,9 @@ def bent(pattern: str, surface: Surface, seed: int = 0) -> Rendered:
 
 @cache
 def under_a_ball(load: str, seed: int) -> Rendered:
-    """Its rim lies between markers; pressed, dragged or turned in a layer of 4 mm; 20 px to an edge."""
+    """The rim of the contact lies between markers; the object is pressed, dragged or turned in a layer of 4 mm; 20 px
+    an edge.
+    """
     return bent("honeycomb", solve(Elastomer(4.0, 0.2, 0.48), Ball(12.0), LOADS[load]).surface(), seed)
 
 
@@ -45,7 +47,7 @@ def test_markers_under_a_contact_are_as_good_as_they_say(load: str, preset: str)
 
 
 def slipped(xy_mm: np.ndarray) -> np.ndarray:
-    """Half of the surface lies a fiftieth of an edge aside, from one place to the next."""
+    """Half of the surface is displaced by a fiftieth of an edge, with a step."""
     moved = np.column_stack([xy_mm, np.zeros(len(xy_mm))])
     moved[:, 1] += 0.02 * np.tanh((xy_mm[:, 0] - 0.15) / 0.05)
     return moved

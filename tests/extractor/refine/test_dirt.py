@@ -1,4 +1,6 @@
-"""Dirt: markers beside it lie where they say, what it hides is told by others, and what is far from it stays."""
+"""Dirt: errors beside dirt agree with the covariances, hidden markers follow from others, and far markers do not
+move.
+"""
 
 from __future__ import annotations
 
@@ -78,7 +80,7 @@ def test_dirt_moves_no_marker_that_it_does_not_touch(
 @pytest.mark.parametrize("pattern", PATTERNS)
 @pytest.mark.parametrize("left", [0, 1, 2])
 def test_what_hardly_shows_lies_where_it_is_said_to_be(pattern: str, preset: str, left: int) -> None:
-    """Of a marker's gridlines none, one or two are left: it is lost, or within a twentieth of an edge."""
+    """None, one or two of a marker's gridlines remain: the marker is lost, or correct within a twentieth of an edge."""
     for trial in range(4):
         rng = np.random.default_rng(trial)
         marker = int(rng.integers(0, 60))

@@ -1,4 +1,4 @@
-"""Cells that look larger or smaller than they are: neither the rim nor virtual markers move by it."""
+"""Cells that look too large or too small: neither the rim nor virtual markers move."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def off(markers: Markers, shot: CaseImage) -> tuple[float, float]:
 @pytest.mark.parametrize("pattern", ["honeycomb", "round"])
 @pytest.mark.parametrize("response", [1.0, 5.0])
 def test_an_unknown_response_moves_neither_rim_nor_virtual_markers(pattern: str, response: float) -> None:
-    """Taken for sRGB, cells look larger or smaller. Where that is left in, the rim is off by 0.5 to 1 px, and virtual
-    markers by 0.3 to 0.5 px."""
+    """Cells look larger or smaller if their values are taken for sRGB. Without correction, the rim is off by 0.5 to 1
+    px, and virtual markers by 0.3 to 0.5 px."""
     shot = plain_frame(pattern, 0).with_sensor(response=response).shoot()
     rim, virtual = off(cached_extractor(pattern, 11).extract(shot.image), shot)
     assert rim < 0.12 and virtual < 0.13
@@ -30,7 +30,9 @@ def test_an_unknown_response_moves_neither_rim_nor_virtual_markers(pattern: str,
 
 @pytest.mark.parametrize("pattern, seed", [("honeycomb", 0), ("round", 2), ("elliptical", 8)])
 def test_bled_inks_lose_no_rim_and_widen_no_blur(pattern: str, seed: int) -> None:
-    """Elliptical loses three markers where the rim may not move by its swelling, five where triangles keep theirs."""
+    """The elliptical pattern loses three markers without the swelling of the rim, five without the correction of
+    triangles.
+    """
     shot = plain_frame(pattern, seed).damaged(bleed_mm=0.1).shoot()
     markers = cached_extractor(pattern, 11).extract(shot.image)
     assert np.isnan(markers.xy_px[:, 0]).sum() <= 3

@@ -24,7 +24,7 @@ def mesh() -> Topology:
 
 
 def test_shifts_solve_the_equations() -> None:
-    """Of six gridlines to a marker, each of which knows its ends' places across it only."""
+    """The information of six gridlines at a marker; a gridline gives the positions of its ends across the line only."""
     own, rng = mesh(), np.random.default_rng(2)
     count = len(own.spokes)
     angle, weight = rng.uniform(0, np.pi, len(own.edges)), rng.uniform(50.0, 200.0, len(own.edges))
@@ -54,7 +54,7 @@ def test_shifts_solve_the_equations() -> None:
 
 
 def test_singular_systems_are_solved_where_they_tell_something() -> None:
-    """No information at all; one gridline alone; two markers that only know their difference."""
+    """No information; one gridline alone; two markers of which only the difference is known."""
     own = mesh()
     count, edges = len(own.spokes), np.asarray(own.edges)
     every = np.ones(count, np.bool_)

@@ -63,7 +63,7 @@ def test_linear_pictures_are_read_as_before_there_were_responses(bent: bool) -> 
 
 
 def mean_outward_px(preset: str, shown: str, read_as: str) -> float:
-    """How far the markers of the rim lie too far outward, on average."""
+    """The mean outward error of the markers of the rim."""
     shifts = []
     for seed in range(SEEDS):
         seen = render(replace(scene(shown), seed=seed), size=SIZE)

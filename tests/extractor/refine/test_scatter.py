@@ -62,7 +62,7 @@ def test_noise_and_what_profiles_leave_are_no_scatter() -> None:
 
 @pytest.mark.parametrize("preset", ["balanced", "accurate"])
 def test_scattered_markers_are_as_good_as_they_say(preset: str) -> None:
-    """With the prior of a smooth map alone, z is 1.6, that of virtual markers 2, and the RMS 0.035 px."""
+    """The prior of a smooth map alone gives a z of 1.6, for virtual markers of 2, and an RMS of 0.035 px."""
     case, rng = SceneCase(layers=8), np.random.default_rng(0)
     reader = cached_extractor(case, preset)  # type: ignore[arg-type]
     d2, virtual_d2, errors = [], [], []

@@ -109,7 +109,7 @@ def test_an_image_leaves_no_trace_in_those_after_it(preset: str) -> None:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_the_most_accurate_preset_is_the_most_accurate(pattern: str) -> None:
-    """Over some noises: each preset is better than the one before, or as good."""
+    """Over several noises, each preset is at least as good as the preset before."""
     found = {}
     for preset in PRESETS:
         errors = []

@@ -1,4 +1,4 @@
-"""Dense fields: exact for what they can represent, smooth across edges, converging, empty where nothing is known."""
+"""Dense fields: exact for fields of their order, smooth across edges, converging, empty where no marker is known."""
 
 from __future__ import annotations
 

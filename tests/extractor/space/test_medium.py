@@ -201,7 +201,7 @@ def test_the_likely_cause_of_a_misfit_at_rest_is_named(cause: str) -> None:
 
 
 def test_a_misfit_that_nothing_explains_is_said_to_be_unknown() -> None:
-    """Noise twenty times what the covariances state: no gel, lens, pose or touch looks like that."""
+    """Noise of twenty times the stated covariances: no gel, lens, pose or touch explains the picture."""
     views, rng = through(), np.random.default_rng(9)
     rest = [noisy(LAYOUT, view, flat(LAYOUT), rng, 0.06) for view in views]
     sure = [replace(markers, cov_px2=markers.cov_px2 / 400) for markers in rest]

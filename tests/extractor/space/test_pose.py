@@ -1,4 +1,6 @@
-"""Poses from the rest frame: found, calibrated, mirrored, jointly, and refused where the image does not tell them."""
+"""Poses from the rest frame: found, calibrated, mirrored, jointly, and refused where the image does not determine the
+pose.
+"""
 
 from __future__ import annotations
 
@@ -129,15 +131,13 @@ def test_a_wrong_mirror_puts_a_view_on_the_other_side_and_is_refused() -> None:
     rig = unplaced(views)
     assert Reconstructor(LAYOUT, rig, seen).poses.views[0].position_mm[2] < 0
     wrong = View(left.name, left.focal_px, left.centre_px, left.distortion, mirrored=False)
-    with pytest.raises(
-        PoseError, match="view 'left' would look at the pattern's front, view 'right' at its back"
-    ):
+    with pytest.raises(PoseError, match="view 'left' would see the pattern's front, view 'right' its back"):
         Reconstructor(LAYOUT, Rig((wrong, rig.views[1])), seen)
     assert right.position_mm[2] < 0
 
 
 def test_a_surface_that_was_pressed_at_rest_is_not_taken_for_the_layout() -> None:
-    """What is no layout at rest shows in the misfit."""
+    """A deformed layout has a large misfit."""
     views = pair()
     poses = Reconstructor(LAYOUT, unplaced(views), rest(views, 9, xyz_mm=pressed(LAYOUT.xy_mm, 0.3))).poses
     assert poses.misfit > 2

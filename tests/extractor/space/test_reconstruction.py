@@ -1,4 +1,4 @@
-"""Points and surfaces in space: covariances against Monte Carlo, what is refused and why, what a lost view leaves."""
+"""Points and surfaces in space: covariances against Monte Carlo, refused input with reasons, results of a lost view."""
 
 from __future__ import annotations
 
@@ -70,7 +70,9 @@ def test_the_covariance_is_what_errors_are(count: int) -> None:
 
 
 def test_the_weights_matter() -> None:
-    """One view ten times as noisy: the plain middle between the rays is worse than what the covariances make of it."""
+    """One view ten times as noisy: the plain middle between the rays is worse than the mean weighted by the
+    covariances.
+    """
     views, rng = pair(), np.random.default_rng(3)
     best, plain = [], []
     for _ in range(10):
@@ -186,7 +188,7 @@ def test_a_tiny_baseline_is_refused_at_the_start(apart_deg: float) -> None:
     views = (looking("a", tilt_deg=20.0), looking("b", tilt_deg=20.0 + apart_deg))
     rng = np.random.default_rng(11)
     rest = [noisy(LAYOUT, view, flat(LAYOUT), rng) for view in views]
-    with pytest.raises(PoseError, match="views 'a' and 'b' stand too near to each other to tell depth"):
+    with pytest.raises(PoseError, match="views 'a' and 'b' stand too near to each other to measure depth"):
         Reconstructor(LAYOUT, unplaced(views), rest)
 
 
@@ -287,7 +289,7 @@ def test_mistakes_are_refused_by_name() -> None:
         (
             Rig(views),
             [replace(rest[0], mirrored=not rest[0].mirrored), rest[1]],
-            "view 'left': its pose looks at",
+            "view 'left': its pose faces the other side",
         ),
         (
             Rig(views),

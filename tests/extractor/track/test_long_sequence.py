@@ -1,4 +1,4 @@
-"""No drift: a long sequence of large motion, and the benchmark that shows it beside optical flow."""
+"""No drift in a long sequence of large motion, and the benchmark that compares the drift with optical flow."""
 
 from __future__ import annotations
 

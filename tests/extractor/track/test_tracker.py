@@ -295,7 +295,9 @@ def test_light_or_focus_that_jumps_is_seen_anew(tint: tuple[float, float, float]
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_equal_frames_agree(pattern: str) -> None:
-    """Within a tenth of the stated standard deviation, from the first frame on, which starts cold."""
+    """Differences are within a tenth of the stated standard deviation, also in the first frame, which has no frame
+    before.
+    """
     squares, stated = [], []
     for seed in range(3):
         for changes in (

@@ -1,4 +1,4 @@
-"""Every kind of file that the project reads, each with a good one: what a test of all of them goes through."""
+"""A good file of every kind that the project reads, for tests of all kinds."""
 
 from __future__ import annotations
 

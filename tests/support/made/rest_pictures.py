@@ -48,7 +48,7 @@ def reference(layout: Layout) -> Reference:
 
 
 def pad_scene(number: int, *surface: Deformation) -> Scene:
-    """The made pad in a pose of its own for every number."""
+    """The made pad, in a different pose for every number."""
     rng = np.random.default_rng([20262, number])
     turn, tilt, axis = rng.uniform(0, 360), rng.uniform(0, 20), rng.uniform(0, 360)
     camera = Camera(PITCH_PX, float(turn), float(tilt), float(axis))

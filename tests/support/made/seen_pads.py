@@ -1,4 +1,4 @@
-"""Pads rebuilt from written files, and what is read of them: independent of what the products predict.
+"""Pads rebuilt from written files, and their readings, independent of the products' predictions.
 
 A pad is a list of colored polygons as the camera sees them: mm, x to the camera's right, y up. Bosses are sliced from
 written meshes, burnt cells replayed from written programs; the picture is drawn by resvg.
@@ -56,7 +56,7 @@ def cast_pad(folder: Path, scale: float) -> list[SeenCell]:
 def carved_pad(
     folder: Path, origin_mm: Points, front_kerf_mm: Points, back_kerf_mm: Points, mirrored: bool
 ) -> list[SeenCell]:
-    """The cells that the written programs leave at the seen side; what is burnt later replaces what was filled."""
+    """The cells of the written programs at the seen side; a later burnt area replaces an earlier filling."""
     radii = (back_kerf_mm if mirrored else front_kerf_mm) / 2
     cells: list[SeenCell] = []
     for program in sorted(folder.glob("laser/[1-9]-*.gcode")):

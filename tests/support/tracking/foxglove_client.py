@@ -20,7 +20,7 @@ MESSAGE_DATA = 1  # the binary opcode of a message
 
 @dataclass
 class Received:
-    """What a client got: the channels by their topics, and (time ns, bytes) of each topic's messages."""
+    """The received data of a client: the channels by their topics, and (time ns, bytes) of each topic's messages."""
 
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
     messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
@@ -72,7 +72,7 @@ def take(client: ClientConnection, received: Received, timeout_s: float | None =
 
 
 def received_while(run: Callable[[], None], port: int) -> Received:
-    """What a client gets while something runs that serves on the port."""
+    """The data that a client receives during a run that serves on the port."""
     received = Received()
 
     def listen() -> None:

@@ -16,7 +16,7 @@ FRAMES = 4
 
 
 def seen_from_the_back() -> str:
-    """The layout file of the views' pattern: they look at its back."""
+    """The layout file of the views' pattern, whose back is in view."""
     options = {"layers": str(SMALL), "pitch_mm": "1.5", "mirrored": "true"}
     return layout_to_json(build_layout(load_design("honeycomb", options)))
 

@@ -1,4 +1,4 @@
-"""Moving patterns for the tests and the benchmark of tracking: what each frame shows, and the truth."""
+"""Moving patterns for the tests and the benchmark of tracking: the content of each frame, and the truth."""
 
 from __future__ import annotations
 

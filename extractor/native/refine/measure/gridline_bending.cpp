@@ -168,7 +168,6 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
       known[m] += weight;
     }
   }
-  const double by_scatter = limits.bend_by_scatter * prior.scatter_variance;
   const double least = squared(limits.min_bend_share), most = squared(limits.max_bend_share);
   for (Index e = 0; e < edges.size(); ++e) {
     const std::int32_t i = edges(e, 0), j = edges(e, 1);
@@ -177,6 +176,7 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
     const double noise = (noise_total[i] + noise_total[j]) / both;
     const double excess =
         (total[i] + total[j]) / both - noise * (1.0 + limits.min_significance * std::sqrt(2.0 / both));
+    const double by_scatter = prior.scatter.bend_variance(prior.scatter_bending[e]);
     const double limit = std::min(most * square, squared(limits.max_bend_deviation * lines(e, LENGTH)));
     out[e] = std::min(std::max({excess, least * square, by_scatter}), limit);
   }
@@ -186,11 +186,12 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
 Array<double, 2> update_without_bending(View<double, 2> sums, ShiftGradients& gradients,
                                         View<const double, 2> bend, View<const double, 1> bend_variance,
                                         double variance) {
-  Array<double, 2> response({sums.size(), 6}, 0.0);
+  Array<double, 2> response({sums.size(), RESPONSE_COLUMNS}, 0.0);
   for (Index e = 0; e < sums.size(); ++e) {
     const auto own = sums[e], out = response[e];
     own[READ_AA] = own[AA];
     own[READ_BB] = own[BB];
+    out[HELD] = 1.0;
     if (own[AA] == 0.0) continue;
     const double c = own[C], d = own[D], ac = own[AC], ad = own[AD], bc = own[BC], bd = own[BD];
     double x = -bend(e, 0), y = -bend(e, 1);
@@ -205,6 +206,7 @@ Array<double, 2> update_without_bending(View<double, 2> sums, ShiftGradients& gr
       out[3] = (cc * ad - cd * ac) * inverse;
       out[4] = (dd * bc - cd * bd) * inverse;
       out[5] = (cc * bd - cd * bc) * inverse;
+      out[HELD] = stiff / cc;
     }
     out[0] = x;
     out[1] = y;

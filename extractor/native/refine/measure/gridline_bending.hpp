@@ -7,6 +7,7 @@
 
 #include "base/array.hpp"
 #include "refine/measure/gridline_weights.hpp"
+#include "refine/measure/marker_scatter.hpp"
 
 namespace cmp::refine {
 
@@ -14,18 +15,23 @@ namespace cmp::refine {
 struct BendingLimits {
   double min_bend_share, max_bend_share, bend_to_end_shift, max_bend_deviation, third_difference_noise;
   double mean_over_median, misfit_tolerance, max_misfit_tolerance, min_significance, max_bend;
-  double bend_by_scatter;
   double min_determinant_share, min_information_share, band;
 
   template <class F>
   static BendingLimits read(const F& f) {
-    return {f["min_bend_share"],         f["max_bend_share"],
-            f["bend_to_end_shift"],      f["max_bend_deviation"],
-            f["third_difference_noise"], f["mean_over_median"],
-            f["misfit_tolerance"],       f["max_misfit_tolerance"],
-            f["min_significance"],       f["max_bend"],
-            f["bend_by_scatter"],        f["min_determinant_share"],
-            f["min_information_share"],  f["band"]};
+    return {f["min_bend_share"],
+            f["max_bend_share"],
+            f["bend_to_end_shift"],
+            f["max_bend_deviation"],
+            f["third_difference_noise"],
+            f["mean_over_median"],
+            f["misfit_tolerance"],
+            f["max_misfit_tolerance"],
+            f["min_significance"],
+            f["max_bend"],
+            f["min_determinant_share"],
+            f["min_information_share"],
+            f["band"]};
   }
 };
 
@@ -48,8 +54,11 @@ struct BendingPrior {
   View<const double, 2> bend;       // (E, 2) px, b and s as drawn
   View<const double, 1> roughness;  // (M,) px^2, of the markers
   View<const double, 1> weight;     // (E,) 0 to 1, of the gridlines
-  double scatter_variance;          // px^2, as in MarkerScatter
+  MarkerScatter scatter;
+  View<const double, 2> scatter_bending;  // (E, 3), the topology's
 };
+
+inline constexpr Index HELD = 6, RESPONSE_COLUMNS = 7;  // of update_without_bending
 
 struct ThirdDifference {
   double x, y;  // px
@@ -96,8 +105,8 @@ Array<double, 1> estimate_bend_variance(View<const double, 2> sums, const ShiftG
 // Eliminates the bending from the gridlines' sums (E, 24) and the gradients.
 //
 // bend (E, 2) px, b and s as drawn; bend_variance (E,) px^2; variance of the noise, gray levels^2.
-// (E, 6): px, the change of b and s with both ends held; px/px, its decrease by a shift of the start, then by
-// a shift of the end, along the normal.
+// (E, 7): px, the change of b and s with both ends held; px/px, its decrease by a shift of the start, then by
+// a shift of the end, along the normal; 0 to 1, how far b is held where the map puts it.
 Array<double, 2> update_without_bending(View<double, 2> sums, ShiftGradients& gradients,
                                         View<const double, 2> bend, View<const double, 1> bend_variance,
                                         double variance);

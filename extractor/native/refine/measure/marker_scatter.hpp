@@ -17,6 +17,13 @@ struct MarkerScatter {
   static MarkerScatter read(const F& f) {
     return {f["variance_px2"], f["share"]};
   }
+
+  // px^2, the variance of a gridline's b; bending (3,), the gridline's scatter_bending of the topology
+  double bend_variance(View<const double, 1> bending) const {
+    const double tangents = 1.0 - share;
+    return variance * (tangents * tangents * bending[0] + 2.0 * tangents * share * bending[1] +
+                       share * share * bending[2]);
+  }
 };
 
 // Limits of scatter; explained in extractor/refine/measure/marker_scatter.py.

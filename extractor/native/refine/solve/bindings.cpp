@@ -8,7 +8,7 @@ namespace cmp::refine {
 
 void add_solve(nb::module_ module) {
   bind<&convergence_covariance>(module, "convergence_covariance",
-                                {"shift", "sigma", "remaining_share", "limits"});
+                                {"shift", "last", "sigma", "remaining_share", "limits"});
   bind<&solve_shifts>(module, "solve_shifts", {"diagonal", "off_diagonal", "edges", "right", "limits"});
   bind<&covariances>(
       module, "covariances",

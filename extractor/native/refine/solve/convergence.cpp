@@ -16,10 +16,19 @@ double median_of_known(View<const double, 1> values) {
   return numeric::median_of_many(known.slice(0, end - known.begin()));
 }
 
+// The sum of the steps that would follow a step (x, y) after another one, in units of this step, if they
+// shrink by the same factor.
+double following_steps(double x, double y, double last_x, double last_y, double max_shrinking) {
+  const double factor = (x * last_x + y * last_y) / (last_x * last_x + last_y * last_y);
+  if (!(factor > 0.0)) return 0.0;
+  const double shrinking = std::min(factor, max_shrinking);
+  return shrinking / (1.0 - shrinking);
+}
+
 }  // namespace
 
-Array<double, 3> convergence_covariance(View<const double, 2> shift, double sigma, double remaining_share,
-                                        const ConvergenceLimits& limits) {
+Array<double, 3> convergence_covariance(View<const double, 2> shift, View<const double, 2> last, double sigma,
+                                        double remaining_share, const ConvergenceLimits& limits) {
   const Index count = shift.size();
   Array<double, 3> out({count, 2, 2}, 0.0);
   Array<double, 1> square({count});
@@ -27,8 +36,10 @@ Array<double, 3> convergence_covariance(View<const double, 2> shift, double sigm
   for (Index m = 0; m < count; ++m) {
     const double x = shift(m, 0), y = shift(m, 1);
     square[m] = x * x + y * y;
-    const double share =
+    const double by_blur =
         std::min(limits.remaining_share * std::sqrt(square[m]) / sigma, limits.max_remaining_share);
+    const double share =
+        std::hypot(by_blur, following_steps(x, y, last(m, 0), last(m, 1), limits.max_shrinking));
     cov(m, 0, 0) = (share * x) * (share * x);
     cov(m, 1, 1) = (share * y) * (share * y);
     cov(m, 0, 1) = cov(m, 1, 0) = share * share * x * y;

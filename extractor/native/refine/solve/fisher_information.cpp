@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "refine/measure/gridline_bending.hpp"
 #include "refine/solve/ring_elimination.hpp"
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/residual_kernel.hpp"
@@ -10,6 +11,8 @@
 namespace cmp::refine {
 
 namespace {
+
+constexpr Index COUPLINGS = 3, BETWEEN = 2;  // of a gridline: start, end, and the two with each other
 
 // Writes the product of the matrix and a vector (M, 2) into out (M, 2).
 void fill_product(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
@@ -77,11 +80,45 @@ Array<std::int64_t, 1> known_markers(View<const double, 2> diagonal, double min_
   return out.first(count);
 }
 
+// Adds the sums of gridline e, times factors for its start, its end and the two with each other.
+void add_gridline(const GridlineSystem& system, Index e, double start, double end, double between,
+                  View<double, 2> diagonal, View<double, 2> off_diagonal) {
+  const auto lines = system.lines[e], sums = system.sums[e];
+  const double w = system.weight[e] * lines[KNOWN] / system.variance;
+  if (w == 0.0) return;
+  const double nx = -lines[UY], ny = lines[UX];
+  for (Index side = 0; side < 2; ++side) {
+    const auto block = diagonal[system.edges(e, side)];
+    const double value = w * (side == 0 ? start * sums[AA] : end * sums[BB]);
+    block[0] += value * nx * nx;
+    block[1] += value * nx * ny;
+    block[2] += value * ny * ny;
+  }
+  const auto block = off_diagonal[e];
+  const double value = w * between * sums[AB];
+  block[0] += value * nx * nx;
+  block[1] += value * nx * ny;
+  block[2] += value * ny * nx;
+  block[3] += value * ny * ny;
+}
+
 }  // namespace
+
+Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
+                         View<const double, 2> bend_response) {
+  Array<double, 2> out({couplings.size(), COUPLINGS});
+  for (Index e = 0; e < couplings.size(); ++e) {
+    for (Index k = 0; k < COUPLINGS; ++k) {
+      const double by_tangents = couplings(e, k), by_curves = couplings(e, COUPLINGS + k);
+      const double coupling = by_tangents + scatter_share * (by_curves - by_tangents);
+      out(e, k) = bend_response(e, HELD) * (coupling - 1.0);
+    }
+  }
+  return out;
+}
 
 InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
                                      bool overlapping, const InformationLimits& limits) {
-  const auto sums = system.sums, lines = system.lines;
   const auto edges = system.edges;
   InformationArrays out{Array<double, 2>({system.spokes.size(), 3}),
                         Array<double, 2>({edges.size(), 4}, 0.0)};
@@ -90,26 +127,23 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     diagonal(m, 0) = diagonal(m, 2) = prior[m];
     diagonal(m, 1) = 0.0;
   }
-  const double coupling = limits.smooth_map_coupling * (1.0 - system.scatter_share);
-  const double own = 1.0 + coupling, between = 1.0 - coupling;
-  for (Index e = 0; e < edges.size(); ++e) {
-    const double w = system.weight[e] * lines(e, KNOWN) / system.variance;
-    if (w == 0.0) continue;
-    const double nx = -lines(e, UY), ny = lines(e, UX);
-    for (Index side = 0; side < 2; ++side) {
-      const Index m = edges(e, side);
-      const double value = w * own * (side == 0 ? sums(e, AA) : sums(e, BB));
-      diagonal(m, 0) += value * nx * nx;
-      diagonal(m, 1) += value * nx * ny;
-      diagonal(m, 2) += value * ny * ny;
-    }
-    const double value = w * between * sums(e, AB);
-    off_diagonal(e, 0) += value * nx * nx;
-    off_diagonal(e, 1) += value * nx * ny;
-    off_diagonal(e, 2) += value * ny * nx;
-    off_diagonal(e, 3) += value * ny * ny;
-  }
+  const double coupling = limits.step_coupling * (1.0 - system.scatter_share);
+  for (Index e = 0; e < edges.size(); ++e)
+    add_gridline(system, e, 1.0 + coupling, 1.0 + coupling, 1.0 - coupling, diagonal, off_diagonal);
   if (overlapping) add_shared_pixels(system, diagonal, off_diagonal, limits.shared);
+  return out;
+}
+
+InformationArrays with_curving(const InformationArrays& of_step, const GridlineSystem& system,
+                               const InformationLimits& limits) {
+  InformationArrays out{Array<double, 2>(of_step.diagonal.view()),
+                        Array<double, 2>(of_step.off_diagonal.view())};
+  const double coupling = limits.step_coupling * (1.0 - system.scatter_share);
+  for (Index e = 0; e < system.edges.size(); ++e) {
+    const auto own = system.curving[e];
+    add_gridline(system, e, own[0] - coupling, own[1] - coupling, own[BETWEEN] + coupling, out.diagonal,
+                 out.off_diagonal);
+  }
   return out;
 }
 

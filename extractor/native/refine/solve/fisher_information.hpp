@@ -30,6 +30,7 @@ struct GridlineSystem {
   View<const double, 1> weight;        // (E,) 0 to 1; a gridline that is not drawn counts as 0
   View<const double, 2> lines;         // (E, 8), as gridlines gives them
   View<const double, 2> contrasts;     // (E, 3) gray levels
+  View<const double, 2> curving;       // (E, 3), as curving gives it
   View<const std::int32_t, 2> edges;   // (E, 2) the markers at the gridlines' ends
   View<const std::int32_t, 2> spokes;  // (M, 6) the gridlines at each marker, -1 for none
   double sigma;                        // the blur, px
@@ -39,24 +40,36 @@ struct GridlineSystem {
 
 // Limits of the information; explained in extractor/refine/solve/fisher_information.py.
 struct InformationLimits {
-  double smooth_map_coupling, held_information;
+  double step_coupling, held_information;
   Index max_steps;
   double precision, min_determinant;
   SharedPixelLimits shared;
 
   template <class F>
   static InformationLimits read(const F& f) {
-    return {f["smooth_map_coupling"], f["held_information"], f["max_steps"],
-            f["precision"],           f["min_determinant"],  f["shared"]};
+    return {f["step_coupling"], f["held_information"], f["max_steps"],
+            f["precision"],     f["min_determinant"],  f["shared"]};
   }
 };
 
-// The information about the markers.
+// (E, 3) how much more than straight lines the gridlines move with their start, with their end, and with the
+// other end.
+//
+// couplings (E, 6), the topology's end_couplings; scatter_share, 0 to 1, as in MarkerScatter; bend_response
+// (E, 7), as update_without_bending gives it: a gridline that is free to bend stays where the image shows it.
+Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
+                         View<const double, 2> bend_response);
+
+// The information about the markers, as a step uses it: every gridline curves as inside the pattern.
 //
 // prior (M,) 1/px^2, before the measurement; overlapping, the sums include the gridlines' ends, where
 // gridlines share their pixels.
 InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
                                      bool overlapping, const InformationLimits& limits);
+
+// The information of a step with gridlines that curve as the system says, for covariances.
+InformationArrays with_curving(const InformationArrays& of_step, const GridlineSystem& system,
+                               const InformationLimits& limits);
 
 // (M, 2) 1/px, the gradient of the log-likelihood at each marker.
 //

@@ -38,8 +38,8 @@ double corner_cosine(const CellSide& one, const CellSide& other, double sigma) {
 // Fills in the distances of the pixels inside a side, in units of the blur.
 //
 // (x0, y0) px is the origin of the pixels' places. Beyond `far` the distance is that from the chord.
-void fill_distances(Index k, Index count, double x0, double y0, const CellOutline& outline,
-                    CellPixels& pixels) {
+CMP_PART_OF_LOOP void fill_distances(Index k, Index count, double x0, double y0, const CellOutline& outline,
+                                     CellPixels& pixels) {
   const CellSide& side = outline.sides[k];
   CellColumn& out = pixels.distance[k];
   const auto limit = static_cast<float>(outline.far);
@@ -83,7 +83,7 @@ inline float wedge_share(float d, float other, const numeric::CornerTerms& corne
 
 // Replaces the distances inside the three sides by the least, the middle and the largest, and fills in the
 // corner between the two sides of the first two.
-void sort_distances(Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void sort_distances(Index count, CellPixels& pixels) {
   auto& distance = pixels.distance;
   for (Index k = 0; k < count; ++k) {
     const float d0 = distance[0][k], d1 = distance[1][k], d2 = distance[2][k];
@@ -99,7 +99,7 @@ void sort_distances(Index count, CellPixels& pixels) {
 //
 // Short loops one after the other: in a long one the processor waits, and the compiler entangles the
 // conditions.
-void fill_two_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void fill_two_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
   const auto [c01, c12, c20] = outline.corners;
   const auto &nearest = pixels.distance[0], &next = pixels.distance[1];
   sort_distances(count, pixels);
@@ -121,14 +121,14 @@ void fill_two_side_coverage(const CellOutline& outline, Index count, CellPixels&
 }
 
 // Adds the shares of the wedge between the sides k and k + 1 less the products of these sides' shares.
-void add_wedge(Index k, const CellOutline& outline, Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void add_wedge(Index k, const CellOutline& outline, Index count, CellPixels& pixels) {
   const numeric::CornerTerms corner = outline.corners[k];
   const auto &one = pixels.distance[k], &other = pixels.distance[(k + 1) % 3];
   for (Index i = 0; i < count; ++i) pixels.wedge[i] += wedge_share(one[i], other[i], corner);
 }
 
 // Fills in the shares of the pixels of any cell.
-void fill_three_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
+CMP_PART_OF_LOOP void fill_three_side_coverage(const CellOutline& outline, Index count, CellPixels& pixels) {
   const auto& distance = pixels.distance;
   std::fill_n(pixels.wedge.begin(), count, 0.0F);
   for (Index k = 0; k < 3; ++k) add_wedge(k, outline, count, pixels);

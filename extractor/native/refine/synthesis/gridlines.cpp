@@ -11,11 +11,12 @@ constexpr Index DERIVATIVES = 5;
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 // Writes the map (2, 5) at marker m; NaN where a neighbour is unknown. near (K,), stencil (5, K).
-void fill_cubic_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
-                            View<const double, 2> stencil, View<double, 2> out) {
+void fill_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
+                      View<const double, 2> stencil, View<double, 2> out) {
   std::array<double, DERIVATIVES> to_x{}, to_y{};
   for (Index k = 0; k < near.size(); ++k) {
     const Index n = near[k];
+    if (n < 0) continue;
     const double dx = xy(n, 0) - xy(m, 0), dy = xy(n, 1) - xy(m, 1);
     for (Index d = 0; d < DERIVATIVES; ++d) {
       to_x[d] += stencil(d, k) * dx;
@@ -76,9 +77,8 @@ Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> whi
   Index count = 0;
   for (Index m = 0; m < xy.size(); ++m) {
     if (!which[m]) continue;
-    // the stencil has weights where both rings are complete
-    const bool is_complete = stencil(m, 0, 0) != 0.0 || stencil(m, 0, 1) != 0.0;
-    if (is_complete) fill_cubic_derivatives(xy, m, near[m], stencil[m], out[m]);
+    const bool has_stencil = stencil(m, 0, 0) != 0.0 || stencil(m, 0, 1) != 0.0;
+    if (has_stencil) fill_derivatives(xy, m, near[m], stencil[m], out[m]);
     if (!std::isfinite(out(m, 0, 0))) {
       out[m].fill(NOT_A_NUMBER);
       incomplete[count++] = m;

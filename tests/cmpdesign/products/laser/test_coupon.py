@@ -1,4 +1,4 @@
-"""The coupon: what it holds, and that the kerf read from a picture of it is the kerf it was cut with."""
+"""The coupon: its content, and the kerf read from its picture, which equals the kerf of the cut."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def run(*arguments: object) -> Result:
     ids=["upright", "turned, JPEG", "300 dpi", "back", "dark ground", "translucent, 16 bits"],
 )
 def test_the_kerf_is_read_back(conditions: dict[str, Any]) -> None:
-    """Blur in linear light, then a response that the reader is not told: stated deviations hold, and are of use."""
+    """Blur in linear light and an unknown response: the stated deviations are correct, and small enough for use."""
     reading = read_coupon(PIECE, coupon_photo(PIECE, CUT, **conditions))
     assert reading.from_back == conditions.get("mirrored", False)
     assert reading.scale_px_mm == pytest.approx(conditions.get("scale_px_mm", 23.6), rel=0.1)
@@ -66,7 +66,7 @@ def errors_of(reading: CouponReading) -> tuple[Points, Points]:
 
 @pytest.mark.parametrize(("response", "blur_px"), [("srgb", 0.5), ("srgb", 2.0), ("linear", 2.0), (1.8, 2.0)])
 def test_blur_does_not_change_widths_in_light(response: Any, blur_px: float) -> None:
-    """Without noise, with the response stated: a kerf within a micrometre for any blur."""
+    """The kerf is correct within a micrometre for any blur, if there is no noise and the response is stated."""
     photo = coupon_photo(PIECE, CUT, response=response, blur_px=blur_px, scale_px_mm=15.0, noise=0.0, bits=16)
     errors_mm, _ = errors_of(read_coupon(PIECE, photo, response=response))
     assert np.abs(errors_mm).max() < 0.001
@@ -95,7 +95,7 @@ def test_clipped_pictures_are_refused(conditions: dict[str, float], expected: st
 
 @pytest.mark.slow
 def test_pooled_errors_over_random_coupons() -> None:
-    """The benchmark's suite, other seed: deviations that are stated are those that are made."""
+    """The benchmark's suite, with another seed: the stated deviations agree with the errors."""
     errors = [read_case(standard_coupon(), number, 20) for number in range(200)]
     pooled = pool_errors(errors)
     assert 0.8 <= pooled.z <= 1.3

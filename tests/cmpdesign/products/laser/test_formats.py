@@ -1,4 +1,4 @@
-"""Every format, opened by readers that are not ours, holds the very paths of the job."""
+"""Every format has exactly the paths of the job, read by other libraries."""
 
 from __future__ import annotations
 
@@ -123,7 +123,8 @@ def test_lightburn(case: int) -> None:
     job, drawing = drawn(case)
     root = ElementTree.fromstring(drawing_to_lightburn(drawing))
     assert root.tag == "LightBurnProject" and root.get("MirrorX") == root.get("MirrorY") == "False"
-    settings = {item.find("name").get("Value"): item for item in root.iterfind("CutSetting")}  # type: ignore[union-attr]
+    # type: ignore[union-attr]
+    settings = {item.find("name").get("Value"): item for item in root.iterfind("CutSetting")}
     assert settings.pop("T1").get("type") == "Tool"
     assert list(settings) == [one.name for one in job.passes]
     indices = set()
@@ -147,7 +148,8 @@ def test_lightburn_fills_a_hatched_pocket() -> None:
         laser__mode="pocket", laser__hatch_mm="0.04", laser__hatch_deg="15", laser__hatch_turn_deg="60"
     )
     root = ElementTree.fromstring(drawing_to_lightburn(job_drawing(job)))
-    settings = {item.find("name").get("Value"): item for item in root.iterfind("CutSetting")}  # type: ignore[union-attr]
+    # type: ignore[union-attr]
+    settings = {item.find("name").get("Value"): item for item in root.iterfind("CutSetting")}
     assert settings["1-red"].get("type") == "Scan+Cut" and settings["0-holes"].get("type") == "Cut"
     value = {child.tag: child.get("Value") for child in settings["1-red"]}
     assert (value["interval"], value["angle"], value["anglePerPass"]) == ("0.04", "15", "60")

@@ -1,4 +1,4 @@
-"""The job as a user meets it: refused or made, in which order and time; and what the camera sees of the result."""
+"""The job: refused or made, its order and time, and the picture of the carved pad."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
 from cmpdesign.cli import app
+from cmpdesign.errors import DesignError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.laser.as_made_svg import as_made_svg
@@ -153,6 +154,25 @@ def test_every_shipped_setting_makes_a_job(material: str) -> None:
             assert all(one.cavities.exists.all() for one in job.cell_passes)  # type: ignore[union-attr]
 
 
+def test_settings_of_pockets_are_needed_by_pockets_alone(tmp_path: Path) -> None:
+    """Each of the three settings may also come from the design."""
+    material = tmp_path / "cuts.toml"
+    lines = materials()["silicone-black"].read_text(encoding="utf-8").splitlines(keepends=True)
+    material.write_text("".join(line for line in lines if not line.startswith("pocket_")), encoding="utf-8")
+    complete = made_job(laser__material="silicone-black")
+    assert made_job(laser__material=str(material)).setup.repeats == complete.setup.repeats
+    pocket = {"laser__material": str(material), "laser__mode": "pocket"}
+    for field, option, value in (
+        ("pocket_power_percent", "power_percent", "20"),
+        ("pocket_speed_mm_s", "speed_mm_s", "100"),
+        ("pocket_depth_per_pass_mm", "passes", "7"),
+    ):
+        with pytest.raises(DesignError, match=rf"has no {field} for this machine.*set laser.{option}$"):
+            made_job(**pocket)
+        pocket[f"laser__{option}"] = value
+    assert made_job(**pocket).setup.repeats == 7
+
+
 def test_own_machine_and_material_files(tmp_path: Path) -> None:
     machine = tmp_path / "mine.toml"
     machine.write_text(machines()["co2-40w"].read_text().replace("value = 300.0", "value = 60.0"))
@@ -284,7 +304,7 @@ def seen(svg: str, job: LaserJob) -> tuple[Points, Points, int]:
 @pytest.mark.parametrize("name", ["honeycomb", "round"])
 @pytest.mark.parametrize("corner", ["plain", "overcut"])
 def test_the_burnt_pattern_is_read_with_no_wrong_id(name: str, corner: str) -> None:
-    """From the programs alone: swept, inked, rendered, extracted. Corners stay where they were designed."""
+    """From the programs alone: swept, inked, rendered, extracted. Corners have their designed positions."""
     job = made_job(name, laser__corner=corner, layers="6", laser__kerf_mm="0.2")
     for svg in (drawn_from_gcode(job), as_made_svg(job)):
         found, true, wrong = seen(svg, job)
@@ -294,7 +314,9 @@ def test_the_burnt_pattern_is_read_with_no_wrong_id(name: str, corner: str) -> N
 
 
 def test_paths_without_compensation_are_the_outlines(tmp_path: Path) -> None:
-    """For shops that compensate themselves; the job sheet, the program and the report say so."""
+    """Paths without compensation, for shops that compensate; the job sheet, the program and the report state the
+    absence.
+    """
     settings_ = ["layers=3", "laser.kerf_mm=0", "laser.outline=true", "laser.taper_deg=1"]
     flags = [flag for text in settings_ for flag in ("--set", text)]
     result = run("build", "honeycomb", "-o", tmp_path, "--only", "laser", *flags)

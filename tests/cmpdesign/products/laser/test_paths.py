@@ -72,7 +72,7 @@ def test_burnt_areas_and_outlines_are_exact(cell: Points, kerf_x: float, kerf_y:
 def test_beams_as_wide_as_the_cell_burn_valid_shapes(
     cell: Points, share: float, ratio: float, corner: str
 ) -> None:
-    """Burns of two spurs overlap; a cell's neighbour is burnt into as deep as a general-purpose library says."""
+    """Burns of two spurs overlap; a cell's neighbour is burnt to the depth that a general-purpose library computes."""
     inscribed = 4 * polygon_areas(cell)[0] / shapely.Polygon(cell[0]).length
     front = BeamFootprint.of_kerf(share * inscribed, share * inscribed * ratio)
     made = make_cavities(np.arange(1), cell, front, corner)  # type: ignore[arg-type]
@@ -130,7 +130,7 @@ def test_three_corners_lose_what_the_formula_says() -> None:
 )
 @pytest.mark.parametrize("name", ["honeycomb", "round"])
 def test_areas_are_nominal(name: str, corner: str, kerf_mm: float) -> None:
-    """Within 0.6 % of the nominal cells of 1.5 mm: plain up to 0.1 mm, overcut up to 0.25 mm of kerf."""
+    """Areas are within 0.6 % of the nominal cells of 1.5 mm: plain up to 0.1 mm, overcut up to 0.25 mm of kerf."""
     job = made_job(name, laser__corner=corner, laser__kerf_mm=str(kerf_mm), laser__depth_mm="0.2mm")
     for one in measure_as_made(job):
         assert abs(one.front.area_error_percent) < 0.6
@@ -187,7 +187,7 @@ def test_predictions_agree_with_a_raster_sweep_of_the_gcode(
 
 
 def pixels_of(stroke: Points, kerf_mm: tuple[float, float]) -> tuple[float, Points]:
-    """Area in mm2 and (N, 2) rim pixels in mm of what a closed stroke burns or cuts out."""
+    """Area in mm2, and (N, 2) rim pixels in mm, of the part that a closed stroke burns or cuts out."""
     margin = 0.3
     low, high = stroke.reshape(-1, 2).min(axis=0) - margin, stroke.reshape(-1, 2).max(axis=0) + margin
     low = np.floor(low / PIXEL_MM) * PIXEL_MM

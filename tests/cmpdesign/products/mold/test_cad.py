@@ -1,4 +1,4 @@
-"""The mold and the pad as build123d objects, and the example that goes on from them."""
+"""The mold and the pad as build123d objects, and the example that changes these objects."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_the_pad_is_its_silicone_layers_on_each_other(crown: str) -> None:
 
 
 def test_the_example_makes_a_housing_around_a_pad(tmp_path: Path) -> None:
-    """Written by build123d and read back: the pad lies in its seat, with clearance, and the camera sees it."""
+    """Files written by build123d and read back: the pad lies in its seat, with clearance, in the camera's view."""
     from build123d import Axis, export_step, import_step
 
     sensor = runpy.run_path(str(EXAMPLE))["sensor"]("gelsight-mini")

@@ -60,7 +60,7 @@ def put(name: str, part: str, xyz_mm: tuple[float, float, float], turned: bool) 
 
 
 def groups(name: str) -> dict[str, list[PartPlace]]:
-    """The places of each step, moved from where they stand side by side to the mold's own frame."""
+    """The positions of each step, moved from the layout side by side to the frame of the mold."""
     found = {}
     for group in make.make_assembly(stack(name), list(parts(name).values())).groups:
         x = group.places[0].xyz_mm[0]
@@ -164,7 +164,7 @@ def test_parts_lie_on_each_other(name: str) -> None:
 
 
 def land_mm(shape: Any, lowest: bool) -> float:
-    """Height of the largest level face that looks down (or up): the one that a part lies on."""
+    """Height of the largest horizontal face with a normal down (or up), on which a part lies."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_SurfaceType
     from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum

@@ -1,4 +1,4 @@
-"""Molds: every solid against its closed form, what cannot be made, clearances, and the files."""
+"""Molds: every solid against its closed form, refused designs, clearances, and the files."""
 
 from __future__ import annotations
 

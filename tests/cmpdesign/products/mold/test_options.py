@@ -1,4 +1,4 @@
-"""No option is silently ignored: each changes what is made, or a finding says that it does not."""
+"""Every option changes the product, or has a finding that states the option's lack of effect."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SHEET = {"page": "letter", "pads": "2", "bleed_mm": "1", "film": "clear"}
 
 
 def made_of(**values: str) -> tuple[object, list[str]]:
-    """What the parts come to, from closed forms, and what is said of them."""
+    """The figures of the parts from closed forms, and the findings on the parts."""
     design = load_design("honeycomb", {"layers": "3", **values})
     stack = make_stack(design, build_layout(design))
     parts = [(part.name, round(part.z_mm, 9), round(part.volume_mm3, 9)) for part in make_parts(stack)]
@@ -62,7 +62,7 @@ def test_options_that_are_not_used_are_named() -> None:
     assert any("mold.crown_radius_mm: 15 mm" in text and "not used on a flat pad" in text for text in flat)
     assert any('mold.projection = "vertical"' in text for text in flat)
     _, narrow = made_of(**CROWNS["sphere"], border_mm="0.5")
-    assert any("border_mm: 0.5 mm, limit 1 mm; taken that wide" in text for text in narrow)
+    assert any("border_mm: 0.5 mm, limit 1 mm; this width is taken" in text for text in narrow)
     _, clipped = made_of(**CROWNS["sphere"], layers="4", clip="circle", clip_diameter_mm="11")
     assert any("whose edge follows its crown (sphere)" in text for text in clipped)
 

@@ -1,4 +1,4 @@
-"""STEP files as text: what a solid's boundary must be, read without the kernel; and what only the kernel can tell."""
+"""STEP files as text: the rules of a solid's boundary, read without the kernel; and the checks that need the kernel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Print sheets: what is on them, true to size, and how a scan of one is read."""
+"""Print sheets: their content, true to size, and the reading of a scan."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_keys_survive_odd_names() -> None:
 
 
 def leaning(image: Pixels, tilt_deg: float, away_mm: float = 400.0) -> Pixels:
-    """The sheet as a camera sees it that looks at its middle from aside."""
+    """The sheet in the picture of a camera that looks at the sheet's middle from the side."""
     height, width = image.shape[:2]
     away, tilt = away_mm / 25.4 * DPI, np.radians(tilt_deg)
     x, y = np.array([(0, 0), (width, 0), (width, height), (0, height)], dtype=float).T

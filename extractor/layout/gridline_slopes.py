@@ -1,0 +1,124 @@
+"""How the slopes of gridlines depend on the markers of a layout, and what follows for their ends and their bending.
+
+A gridline is the cubic between two markers with slopes against its chord (``gridlines``). The slopes come from the maps
+at its ends, and the maps from the markers around. A marker that moves alone therefore bends the gridlines around it, at
+the rim otherwise than inside, because the rim's markers have neighbours on one side only. The slopes are linear in the
+markers:
+
+    by tangents: l = d_a - c, a = d_b - c
+    by second derivatives: l = -(2 k_a + k_b) / 6, a = (k_a + 2 k_b) / 6
+
+l and a: the slopes at the start and at the end times the gridline's length. d and k: the map's first and second
+derivatives along the edge, at its start (a) and end (b). c: the offset of the end less that of the start.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor._native import layout as native
+
+CHORD = np.array([-1.0, 1.0])  # of the offsets of a gridline's start and end
+SIDE_SUMS = (
+    np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+)  # of products of straight lines along a gridline, by their ends
+
+
+class SlopeWeights(NamedTuple):
+    """The weights of the markers in the slopes of E gridlines, by tangents (first) and second derivatives (second).
+
+    Attributes:
+        ids: (E, K) marker ids; an id that is there twice has the sum of both weights.
+        leave, arrive: (2, E, K) the weights in the slopes at the start and at the end, times the length.
+    """
+
+    ids: NDArray[np.int64]
+    leave: NDArray[np.float64]
+    arrive: NDArray[np.float64]
+
+
+def slope_weights(
+    stencil: NDArray[np.float64],
+    ring_markers: NDArray[np.int32],
+    edges: NDArray[np.int64],
+    edge_vectors: NDArray[np.float64],
+) -> SlopeWeights:
+    """The weights; the arguments are ``derivative_stencil`` and others of ``Topology``."""
+    x, y = edge_vectors.T
+    ids, first, second, chord = [], [], [], []
+    for at in (0, 1):
+        marker = edges[:, at]
+        ring = np.where(
+            ring_markers[marker] >= 0, ring_markers[marker], marker[:, None]
+        )  # those without weight
+        ids.append(np.concatenate([ring, marker[:, None]], axis=1))
+        weights = stencil[marker]
+        first.append(_with_own(x[:, None] * weights[:, 0] + y[:, None] * weights[:, 1]))
+        curved = np.stack([x * x, 2 * x * y, y * y], axis=1)
+        second.append(_with_own(np.einsum("ed,edk->ek", curved, weights[:, 2:])))
+        chord.append(np.zeros_like(first[at]))
+        chord[at][:, -1] = CHORD[at]
+    nothing, both_chords = np.zeros_like(first[0]), np.concatenate(chord, axis=1)
+    leave = [
+        np.concatenate([first[0], nothing], axis=1) - both_chords,
+        np.concatenate([2 * second[0], second[1]], axis=1) / -6.0,
+    ]
+    arrive = [
+        np.concatenate([nothing, first[1]], axis=1) - both_chords,
+        np.concatenate([second[0], 2 * second[1]], axis=1) / 6.0,
+    ]
+    return SlopeWeights(np.concatenate(ids, axis=1), np.stack(leave), np.stack(arrive))
+
+
+def end_couplings(slopes: SlopeWeights, edges: NDArray[np.int64]) -> NDArray[np.float64]:
+    """How gridlines move with their ends, relative to straight lines between these.
+
+    The offset from the chord, t (1 - t) (l (1 - t) - a t), is as a straight line (4 l - a) / 30 at the start and
+    (l - 4 a) / 30 at the end.
+
+    Returns:
+        (E, 6) float64, three by tangents and three by second derivatives: the sum of the products with a straight line
+        from 1 at the start to 0 at the end, when the start moves by 1, over that of a straight line; the same at the
+        end; the mean of both when the other end moves.
+    """
+    moved = np.empty((2, len(edges), 2, 2))  # the straight line's ends, when an end of the edge moves
+    for by in (0, 1):
+        own = slopes.ids == edges[:, by, None]
+        leave, arrive = ((weights * own).sum(axis=2) for weights in (slopes.leave, slopes.arrive))
+        moved[..., 0, by] = (by == 0) + (4.0 * leave - arrive) / 30.0
+        moved[..., 1, by] = (by == 1) + (leave - 4.0 * arrive) / 30.0
+    products = SIDE_SUMS @ moved
+    between = products[..., 0, 1] + products[..., 1, 0]
+    couplings = 3.0 * np.stack([products[..., 0, 0], products[..., 1, 1], between], axis=2)
+    return np.concatenate(list(couplings), axis=1)
+
+
+def scatter_bending(
+    slopes: SlopeWeights,
+    edges: NDArray[np.int64],
+    edge_vectors: NDArray[np.float64],
+    spokes: NDArray[np.int32],
+) -> NDArray[np.float64]:
+    """How independent scatter of the markers bends the gridlines, where cells keep straight sides.
+
+    The b (``gridline_bending``) of a gridline is half of the difference of its slopes. The gridlines at a marker bend
+    together, because their slopes come from the same markers, and move the marker by the b that suits all of them best.
+    The variance is that of gridlines which bend each by itself and move it as much.
+
+    Returns:
+        (E, 3) float64, over the variance of the scatter: the variance of b by tangents, its covariance with the b by
+        second derivatives, and the variance of the latter; means of both ends.
+    """
+    normals = np.stack([-edge_vectors[:, 1], edge_vectors[:, 0]], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    weights = 0.5 * (slopes.leave - slopes.arrive)
+    at_markers: NDArray[np.float64] = native.scatter_bending(slopes.ids, weights, normals, spokes)
+    return np.asarray(at_markers[edges].mean(axis=1))
+
+
+def _with_own(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The weights of differences from a marker to its ring (E, K), and that of the marker itself (E, K + 1)."""
+    return np.concatenate([weights, -weights.sum(axis=1, keepdims=True)], axis=1)
