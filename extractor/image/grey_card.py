@@ -24,14 +24,16 @@ class GreyCardLimits(NamedTuple):
 
     Attributes:
         sigma_share: of the image's shorter side: the standard deviation of the Gaussian over which means are taken.
-        half_weight_share: of the typical independent variation of the channels; a tile with it weighs one half.
+            Chosen.
+        half_weight_share: of the typical independent variation of the channels; a tile with it weighs one half. Chosen.
         rest_weight_share: of the weight of a whole neighbourhood: the weight of the whole pattern, which counts far
-            away from it.
+            away from it. Chosen.
         white_ratio: typical ratio of the strongest channel's mean to the weakest one's up to which the light counts as
             white: hues tell the inks apart then, and where inks are of different strength, gains would tint white.
-        ink_ratio: the part of that ratio that is left to inks of different strength when the light is colored.
-        min_level: gray levels, the least mean over black; below it, the mean is noise.
-        max_gain: the largest gain of a channel.
+            Chosen.
+        ink_ratio: the part of that ratio that is left to inks of different strength when the light is colored. Chosen.
+        min_level: gray levels, the least mean over black; below it, the mean is noise. Chosen.
+        max_gain: the largest gain of a channel. Chosen.
     """
 
     sigma_share: float = 0.15
