@@ -1,0 +1,91 @@
+"""How gridlines move and bend with the markers of a layout: as found by moving markers, and by random ones.
+
+Inside: covariances show a wrong coupling at the rim only, and only in the mean of many images.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.scene.standard import standard_layout
+from extractor import Reference, parse_layout
+from extractor.layout.topology import Topology, topology_of
+from extractor.refine.synthesis.gridlines import gridlines, local_maps
+
+PATTERNS = ("honeycomb", "round", "elliptical")
+SIDE_SUMS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0  # of straight lines between 0 and 1
+
+
+def reference(pattern: str) -> Reference:
+    return parse_layout(layout_to_json(standard_layout(pattern, 5)))
+
+
+def places(layout: Reference, edge_px: float) -> NDArray[np.float64]:
+    chords = np.diff(layout.xy_mm[layout.edges.astype(np.int64)], axis=1)
+    return np.asarray(edge_px / np.linalg.norm(chords, axis=2).mean() * layout.xy_mm)
+
+
+def normals(topology: Topology) -> NDArray[np.float64]:
+    across = np.stack([-topology.edge_vectors[:, 1], topology.edge_vectors[:, 0]], axis=1)
+    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
+
+
+def slopes(topology: Topology, xy: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    """(E, 2) px, the slopes at both ends of the gridlines, times their length."""
+    maps = local_maps(xy, topology.ring_markers, topology.ring_vectors, topology.derivative_stencil)
+    straight = np.zeros((len(topology.edges), 2))
+    lines = gridlines(xy, maps, straight, topology.edges, topology.edge_vectors, share)
+    return np.asarray(lines[:, 4:5] * lines[:, 5:7])
+
+
+@pytest.mark.parametrize("way", [0, 1], ids=["tangents", "second derivatives"])
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_couplings_are_those_of_moved_ends(pattern: str, way: int) -> None:
+    layout = reference(pattern)
+    topology, xy, step = topology_of(layout), places(layout, 20.0), 1e-4
+    across = normals(topology)
+    for e in range(0, len(topology.edges), 5):
+        moved = np.empty((2, 2))  # both ends of the straight line that fits best, by the moved end
+        for by, marker in enumerate(topology.edges[e]):
+            there, back = xy.copy(), xy.copy()
+            there[marker] += step * across[e]
+            back[marker] -= step * across[e]
+            change = slopes(topology, there, way)[e] - slopes(topology, back, way)[e]
+            leave, arrive = change / (2 * step)
+            moved[:, by] = (by == 0) + (4 * leave - arrive) / 30, (by == 1) + (leave - 4 * arrive) / 30
+        product = SIDE_SUMS @ moved
+        expected = 3 * product[0, 0], 3 * product[1, 1], 3 * (product[0, 1] + product[1, 0])
+        assert topology.end_couplings[e, 3 * way : 3 * way + 3] == pytest.approx(expected, abs=2e-3)
+
+
+def test_a_gridline_moves_more_inside_and_less_at_the_rim_than_a_straight_line() -> None:
+    """Inside, cardinal cubics have 1.1; at the rim, the parabola through three markers has 7/8."""
+    layout = reference("honeycomb")
+    topology, layer = topology_of(layout), layout.layer[layout.edges.astype(np.int64)]
+    last = layout.layer.max()
+    couplings, rim = topology.end_couplings, layer == last
+    assert np.allclose(couplings[(layer < last - 2).all(axis=1), :2], 1.0867, atol=1e-3)
+    inward = rim[:, 0] != rim[:, 1]
+    at_rim = np.where(rim[inward, 0], couplings[inward, 0], couplings[inward, 1])
+    assert np.median(at_rim) == pytest.approx(7 / 8, abs=0.04) and at_rim.max() < 0.95
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_scatter_bends_gridlines_as_random_markers_do(pattern: str) -> None:
+    """The shifts of the markers by the bending of all gridlines at each, over those by independent bending."""
+    layout = reference(pattern)
+    topology, xy = topology_of(layout), places(layout, 200.0)
+    edges, across = topology.edges.astype(np.int64), normals(topology)
+    sums = np.zeros((len(xy), 2, 2))
+    np.add.at(sums, edges, (across[:, :, None] * across[:, None])[:, None])
+    rng, draws, squares = np.random.default_rng(3), 300, np.zeros(len(xy))
+    for _ in range(draws):
+        leave, arrive = slopes(topology, xy + rng.normal(0.0, 1.0, xy.shape), 1.0).T
+        pull = np.zeros_like(xy)
+        np.add.at(pull, edges, (across * 0.5 * (leave - arrive)[:, None])[:, None])
+        squares += (np.linalg.solve(sums, pull[..., None]) ** 2).sum(axis=(1, 2)) / draws
+    known = 0.25 * np.trace(sums, axis1=1, axis2=2)
+    assert topology.scatter_bending[:, 2].mean() == pytest.approx((known * squares)[edges].mean(), rel=0.1)
