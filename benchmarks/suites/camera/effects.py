@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from benchmarks.suites.camera.lamps import blackbody_rgb, led_rgb
-from benchmarks.suites.camera.parts import RGB, Chain, Demosaicing, Inks, Surround, SurroundKind
+from benchmarks.suites.camera.parts import PIGMENTS, RGB, Chain, Demosaicing, Inks, Surround, SurroundKind
 from cmpdesign.scene import Led, Light
 
 Rng = np.random.Generator
@@ -28,6 +28,8 @@ SURROUNDS: tuple[tuple[SurroundKind, RGB], ...] = (
     ("wood", (0.33, 0.18, 0.08)),
     ("skin", (0.52, 0.29, 0.20)),
 )
+WEAKEST_CHANNEL, WEAK_CHANNELS = 0.05, 0.2  # of the light of the strongest channel
+MOST_LIFTED = 0.22  # of the largest light
 SHARP_BLUR_PX, SOFT_BLUR_PX = 0.5, 1.1  # of the lens before a mosaic: a sharp one shows false colors
 
 
@@ -89,6 +91,39 @@ def _temperature_rgb(strength: float, rng: Rng) -> RGB:
     # daylight of the neutral temperature is white
     relative = np.array(blackbody_rgb(temperature_k)) / np.array(blackbody_rgb(NEUTRAL_K))
     return _rgb(relative / relative.max())
+
+
+def change_pigments(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Inks as they are made: pigmented silicone, pastel, a dark green, a navy, an orange, fluorescent inks."""
+    target = PIGMENTS[int(rng.integers(len(PIGMENTS)))]
+    inks = {}
+    for item in fields(Inks):
+        made, standard = np.array(getattr(target, item.name)), np.array(getattr(chain.inks, item.name))
+        inks[item.name] = _rgb(standard + strength * (made - standard))
+    return replace(chain, inks=Inks(**inks))
+
+
+def color_light(chain: Chain, strength: float, rng: Rng) -> Chain:
+    """Light of another color, and no white balance.
+
+    A lamp of 2,500 to 15,000 K; one channel with a twentieth of the light; two channels with a fifth; or a red, a green
+    and a blue lamp from three sides over a weak white one.
+    """
+    gain, kind, channel = np.ones(3), int(rng.integers(4)), int(rng.integers(3))
+    leds: tuple[Led, ...] = ()
+    if kind == 0:
+        gain = np.array(_temperature_rgb(strength, rng))
+    elif kind == 1:
+        gain[channel] = WEAKEST_CHANNEL**strength
+    elif kind == 2:
+        gain[:] = WEAK_CHANNELS**strength
+        gain[channel] = 1.0
+    else:
+        gain *= 1.0 - strength * float(rng.uniform(0.6, 0.95))
+        first, reach = float(rng.uniform(0, 360)), float(rng.uniform(0.6, 1.3))
+        leds = tuple(Led(first + 120.0 * k, led_rgb(120.0 * k, strength), reach) for k in range(3))
+    development = replace(chain.development, balance=0.0)
+    return replace(chain, lamps=Light(rgb=_rgb(gain), leds=leds if strength else ()), development=development)
 
 
 def change_surround(chain: Chain, strength: float, rng: Rng) -> Chain:
@@ -178,8 +213,8 @@ def add_noise(chain: Chain, strength: float, rng: Rng) -> Chain:
 
 
 def lift_black(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Black lifted by up to a tenth of the largest light."""
-    return replace(chain, sensor=replace(chain.sensor, lifted_black=0.1 * strength))
+    """Black lifted by up to 0.22 of the largest light: to 130 of 255."""
+    return replace(chain, sensor=replace(chain.sensor, lifted_black=MOST_LIFTED * strength))
 
 
 def misbalance(chain: Chain, strength: float, rng: Rng) -> Chain:
@@ -217,7 +252,9 @@ def compress(chain: Chain, strength: float, rng: Rng) -> Chain:
 
 EFFECTS: dict[str, Effect] = {
     "inks": change_inks,
+    "pigments": change_pigments,
     "lamps": change_lamps,
+    "colored light": color_light,
     "surround": change_surround,
     "shifted colors": shift_colors,
     "scattered corners": scatter_corners,
@@ -241,7 +278,7 @@ EFFECTS: dict[str, Effect] = {
 }
 
 
-COLOR_EFFECTS = ("inks", "lamps", "surround", "lifted black", "white balance")
+COLOR_EFFECTS = ("inks", "pigments", "lamps", "colored light", "surround", "lifted black", "white balance")
 
 
 def _rgb(values: np.ndarray) -> RGB:

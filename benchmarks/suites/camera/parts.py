@@ -42,6 +42,12 @@ class Pose:
     centre_px: tuple[float, float] = (319.5, 239.5)
 
 
+def _reflectance(rgb: tuple[int, int, int]) -> RGB:
+    """Linear light of an sRGB color of 8 bits."""
+    red, green, blue = (((value / 255 + 0.055) / 1.055) ** 2.4 for value in rgb)
+    return red, green, blue
+
+
 @dataclass(frozen=True)
 class Inks:
     """Linear reflectances (R, G, B), 0 to 1. The defaults are those of the standard scene."""
@@ -51,6 +57,21 @@ class Inks:
     blue: RGB = (0.0262, 0.0452, 0.5149)
     white: RGB = (0.9131, 0.9131, 0.9131)
     black: RGB = (0.0070, 0.0070, 0.0070)
+
+
+# Reflectances of inks as they are made, each of sRGB colors: pigmented silicone, pastel, a dark green, a navy and an
+# orange among printed inks, fluorescent ones. The order is that of ``Inks``.
+PIGMENTS = tuple(
+    Inks(*(_reflectance(rgb) for rgb in inks))
+    for inks in (
+        ((170, 60, 55), (70, 120, 80), (60, 80, 140), (205, 200, 190), (45, 42, 40)),
+        ((235, 150, 150), (150, 220, 160), (150, 170, 235), (240, 240, 235), (60, 60, 60)),
+        ((200, 50, 45), (20, 80, 35), (45, 60, 190), (230, 230, 230), (20, 20, 20)),
+        ((200, 50, 45), (40, 150, 60), (25, 30, 90), (230, 230, 230), (18, 18, 18)),
+        ((225, 100, 30), (40, 150, 60), (45, 60, 190), (235, 235, 230), (20, 20, 20)),
+        ((255, 40, 90), (60, 255, 70), (60, 90, 255), (250, 250, 250), (25, 25, 25)),
+    )
+)
 
 
 @dataclass(frozen=True)
