@@ -22,14 +22,15 @@ class ConvergenceLimits(NamedTuple):
         remaining_share: of a step, per blur, that another step would still correct. Chosen.
         max_remaining_share: of a step, at most. Chosen.
         max_shrinking: of a marker's last step over the step before, at most; the following steps would shrink by the
-            same factor. Chosen.
+            same factor. Chosen: the following steps together are at most as long as the last one, because a factor from
+            two steps is uncertain.
         mean_over_median: of squares, by which the median of the squared shifts becomes their mean. Derived: 1 / ln 2,
             of the sum of two normal squares.
     """
 
     remaining_share: float = 1.0
     max_remaining_share: float = 0.5
-    max_shrinking: float = 0.9
+    max_shrinking: float = 0.5
     mean_over_median: float = 1.44
 
 
