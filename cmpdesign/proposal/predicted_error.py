@@ -27,6 +27,9 @@ from cmpdesign.scene.scene import Scene
 EXACT_LAYERS, EXACT_PITCH_PX = 3, 20
 # With this number of layers, the inner markers have the gridline bound of the inner markers of any larger pattern.
 GRIDLINE_LAYERS = 8
+# The reader's maps have markers on one side only at the rim. There a gridline moves by a tenth less with its end than the
+# straight gridlines of the bound (``extractor.layout.gridline_slopes``), and errors are larger by as much.
+RIM_FACTOR = 1.1
 Points = NDArray[np.float64]
 # A turn at which no gridline lies along a row of pixels.
 TURN_DEG = 7.3
@@ -56,13 +59,15 @@ class PredictedError(NamedTuple):
 def predict_error(pitch_px: float, imaging: Imaging) -> PredictedError:
     """The smallest error of free markers at a pitch, in an sRGB picture of the default inks with a black border.
 
+    In the outermost layer, the error is that of the reader's curved gridlines.
+
     Args:
         pitch_px: pixels from marker to marker.
         imaging: blur and noise.
     """
     factor = _exact_over_gridline(min(int(pitch_px), EXACT_PITCH_PX), imaging)
     large = _errors(GRIDLINE_LAYERS, pitch_px, imaging, cramer_rao)
-    return PredictedError(large.inner_px * factor.inner_px, large.rim_px * factor.rim_px)
+    return PredictedError(large.inner_px * factor.inner_px, RIM_FACTOR * large.rim_px * factor.rim_px)
 
 
 @cache

@@ -53,7 +53,8 @@ def squares_of(preset: str, kind: str) -> tuple[list[Squares], list[Squares]]:
 def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> None:
     d2, _ = squares_of(preset, kind)
     found = summarise(d2)
-    assert 0.9 < found.z.value < {"fast": 1.3, "balanced": 1.15, "accurate": 1.1}[preset]
+    least, most = {"fast": (0.85, 1.3), "balanced": (0.9, 1.15), "accurate": (0.9, 1.1)}[preset]
+    assert least < found.z.value < most
     assert 0.8 < found.median_z < 1.2  # the bulk of them, too
     # six deviations per axis; fast leaves a marker whose triangles were wrong by a quarter of a pixel
     assert np.concatenate(d2).max() < (200 if preset == "fast" else 72)
