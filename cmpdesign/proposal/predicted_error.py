@@ -27,8 +27,8 @@ from cmpdesign.scene.scene import Scene
 EXACT_LAYERS, EXACT_PITCH_PX = 3, 20
 # With this number of layers, the inner markers have the gridline bound of the inner markers of any larger pattern.
 GRIDLINE_LAYERS = 8
-# The reader's maps have markers on one side only at the rim. There a gridline moves by a tenth less with its end than the
-# straight gridlines of the bound (``extractor.layout.gridline_slopes``), and errors are larger by as much.
+# The reader's maps have markers on one side only at the rim. There a gridline moves by a tenth less with its end than
+# the straight gridlines of the bound (``extractor.layout.gridline_slopes``), and errors are larger by as much.
 RIM_FACTOR = 1.1
 Points = NDArray[np.float64]
 # A turn at which no gridline lies along a row of pixels.
