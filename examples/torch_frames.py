@@ -7,8 +7,7 @@
             loss = criterion(model(image.float() / 255), target["force_n"])
 
 Complete shards are distributed: no two workers, and no two machines of a distributed training, read the same shard.
-    Frames
-are shuffled in a buffer, because the frames of a shard follow each other.
+Frames are shuffled in a buffer, because the frames of a shard follow each other.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The output folder and each product's folder have a list of the written files with digests. Only files on a list with an
 unchanged digest are removed, so files of the user and changed files are kept. A list also names the pattern of its
 files: where a build makes another pattern, all files of the earlier pattern are removed, because files of two patterns
-    do not fit together.
+do not fit together.
 """
 
 from __future__ import annotations

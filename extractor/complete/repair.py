@@ -6,7 +6,7 @@ give it, through one local quadratic map. Heavy omission (Fig. 8): a quadratic t
 sextant, read at equidistant places. A marker that neither method predicts within a tenth of an edge stays lost.
 
 The prediction by the rings of an uncertain marker, as under dirt, may be better than its measurement: both are
-    combined.
+combined.
 """
 
 from __future__ import annotations

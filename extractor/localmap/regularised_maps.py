@@ -1,8 +1,7 @@
 """Quadratic maps through the markers of two rings, with regularised curvature, for many markers at once.
 
-They are used for markers whose rings are incomplete: at the pattern's rim and around damage. An unknown neighbour has
-    no
-weight.
+The maps are used where markers of the rings are unknown: around damage, in images that cut the pattern, and in small
+patterns. An unknown neighbour has no weight.
 """
 
 from __future__ import annotations

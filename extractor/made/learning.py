@@ -71,9 +71,8 @@ def learn_layout(
     homography.
 
     The pictures determine the places up to a homography of the whole pad: its position, turn, size, shear and
-        perspective
-    are those that fit the nominal places best. A deformation of all pictures, as by the lens of a camera that cannot
-    move over its pad, enters the places; this has no effect on displacements from these places.
+    perspective are those that fit the nominal places best. A deformation of all pictures, as by the lens of a camera
+    that cannot move over its pad, enters the places; this has no effect on displacements from these places.
 
     Args:
         layout: the nominal layout of a triangular pattern, as for ``Extractor``.

@@ -198,9 +198,8 @@ def _doubt(best: _Candidate, rivals: list[_Candidate], min_cells: float) -> Reas
     """The reason why the best candidate is not certain.
 
     A second candidate with the surroundings of a reference is a second pad: of its layout no more cells are missing in
-        the image
-    than of the best candidate's. A white place within a single pad misses the cells beyond the pad's outline, if the
-    outline is in view.
+    the image than of the best candidate's. A white place within a single pad misses the cells beyond the pad's outline,
+    if the outline is in view.
     """
     others = [one for one in rivals if one.component != best.component and one.fits]
     beside = [one for one in rivals if one.component == best.component]

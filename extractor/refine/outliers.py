@@ -1,10 +1,9 @@
 """Markers that contradict their neighbours, because of dirt that looks like a gridline.
 
 Two independent criteria must agree: the gridlines of the marker do not look like the pattern, and most gridlines
-    through
-the marker show that the map would be smooth if the marker were moved by one vector. The marker then starts again from
-the moved place. Sharp bends, at the rim of an object or where it slips, give vectors that differ from one gridline to
-the next.
+through the marker show that the map would be smooth if the marker were moved by one vector. The marker then starts
+again from the moved place. Sharp bends, at the rim of an object or where it slips, give vectors that differ from one
+gridline to the next.
 """
 
 from __future__ import annotations

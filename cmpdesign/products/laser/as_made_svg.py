@@ -1,8 +1,7 @@
 """as-made.svg: the pattern as carved, at the side that the camera sees, filled with ink, at true size.
 
 The drawing is not mirrored: the front's x points to the right. The file has the structure of ``pattern.svg``, so that
-    programs can
-compare and render the drawing and the extractor can read the rendering.
+programs can compare and render the drawing and the extractor can read the rendering.
 """
 
 from __future__ import annotations

@@ -23,8 +23,7 @@ def write_rrd(chunks: Iterable[Columns], about: Columns, path: Path, images: Pat
     """Write a .rrd file; the file is complete on disk before it gets its name.
 
     The bytes differ from run to run: Rerun gives its rows identifiers with a time. The recording's identifier does not
-        differ: the same
-    run is the same recording to a viewer.
+    differ: the same run is the same recording to a viewer.
 
     Args:
         chunks: the columns of frames, chunk by chunk, of a ``RecordedTable``.

@@ -1,6 +1,6 @@
 // Quadratic maps through the markers of two rings, with regularised curvature, for many markers at once.
 //
-// They serve markers whose rings are incomplete: at the pattern's rim and around damage. An unknown neighbour
+// The maps are used where markers of the rings are unknown, as around damage. An unknown neighbour
 // has no weight.
 #pragma once
 

@@ -8,8 +8,8 @@ gridlines, which are 0 where the map is quadratic. A gridline then deviates from
 
 t along the chord, b and s of zero mean and a deviation that is a share of these differences. The share, from
 ``min_bend_share`` to ``max_bend_share``, follows from the surrounding gridlines: their bending above the part that
-    noise
-explains. Both unknowns are eliminated from a gridline's sums before the markers are solved, and computed afterwards.
+noise explains. Both unknowns are eliminated from a gridline's sums before the markers are solved, and computed
+afterwards.
 """
 
 from __future__ import annotations

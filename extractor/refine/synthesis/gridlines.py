@@ -45,8 +45,9 @@ def local_maps(
 ) -> NDArray[np.float64]:
     """The local map at each marker.
 
-    Where both rings are complete, the derivatives are those of a cubic. Elsewhere they are those of a quadratic, whose
-    second derivatives are regularised towards 0 and are 0 where fewer than five neighbours are known.
+    Where all markers of the stencil are known, the derivatives are by the stencil. Elsewhere they are those of a
+    quadratic through the known ones, whose second derivatives are regularised towards 0 and are 0 where fewer than five
+    are known.
 
     Args:
         xy: (M, 2) px, NaN where unknown.

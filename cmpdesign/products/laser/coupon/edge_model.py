@@ -2,9 +2,8 @@
 
 Blur in linear light makes a straight edge symmetric; the response then makes the edge asymmetric. The model draws every
 edge in this order: a symmetric edge (a sum of Gaussian ones, the same for all edges) between the light of sheet and
-    opening, encoded by a
-response. The residual is the part that is not symmetric in this light. The exponent of the light is fitted, or held at
-1.
+opening, encoded by a response. The residual is the part that is not symmetric in this light. The exponent of the light
+is fitted, or held at 1.
 """
 
 from __future__ import annotations

@@ -37,10 +37,10 @@ struct ExtrapolatedMarkers {
 // (M, 2, 5), the local map at each marker: derivatives of x and y by the layout's x, y, xx, xy, yy;
 // NaN where unknown.
 //
-// Where both rings are complete, the derivatives are those of a cubic. Elsewhere they are those of a
-// quadratic, whose second derivatives are regularised towards 0 and are 0 where fewer than five neighbours
-// are known. xy (M, 2) px, NaN where unknown; near, offset and stencil: ring_markers, ring_vectors and
-// derivative_stencil of the topology.
+// Where all markers of the stencil are known, the derivatives are by the stencil. Elsewhere they are those of a
+// quadratic through the known ones, whose second derivatives are regularised towards 0 and are 0 where fewer
+// than five are known. xy (M, 2) px, NaN where unknown; near, offset and stencil: ring_markers, ring_vectors
+// and derivative_stencil of the topology.
 Array<double, 3> local_maps(View<const double, 2> xy, View<const std::int32_t, 2> near,
                             View<const double, 3> offset, View<const double, 3> stencil,
                             const GridlineLimits& limits);
