@@ -40,7 +40,7 @@ POOR = Quality(
 OTHERS: dict[str, tuple[type[Enum], str]] = {
     "Statuses of markers": (Status, "`Markers.status`, as numbers."),
     "Statuses of virtual markers": (VirtualStatus, "`Markers.virtual_status`, as numbers."),
-    "Origins": (Origin, "`Markers.origin`: what fixed where the numbering begins."),
+    "Origins": (Origin, "`Markers.origin`: the evidence that determines the start of the numbering."),
     "Statuses of frames": (FrameStatus, "`Tracked.status`; `frame_status` in tables."),
     "Starts of frames": (StartKind, "`Tracked.start`; `start` in tables."),
     "Reasons of points in space": (PointReason, "Why a point of a `Shape` is unknown."),
