@@ -51,9 +51,8 @@ def slope_weights(
     ids, first, second, chord = [], [], [], []
     for at in (0, 1):
         marker = edges[:, at]
-        ring = np.where(
-            ring_markers[marker] >= 0, ring_markers[marker], marker[:, None]
-        )  # those without weight
+        # a missing neighbour has no weight, whatever its id
+        ring = np.where(ring_markers[marker] >= 0, ring_markers[marker], marker[:, None])
         ids.append(np.concatenate([ring, marker[:, None]], axis=1))
         weights = stencil[marker]
         first.append(_with_own(x[:, None] * weights[:, 0] + y[:, None] * weights[:, 1]))

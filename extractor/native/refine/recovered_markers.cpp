@@ -154,18 +154,18 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
                               state.sigma,
                               state.noise * state.noise,
                               state.scatter.share};
-  const InformationArrays information = fisher_information(system, prior, false, step.information);
+  InformationArrays information = fisher_information(system, prior, false, step.information);
   const Array<double, 2> measured = shifted_markers(
       system, information, read.gradients.start.slice(0, count), read.gradients.end.slice(0, count),
       selected_rows(state.xy, own.markers.view()), step.information);
+  update_to_curving(information, system, step.information);
   const Array<double, 2> start = selected_rows(places.xy_px, own.markers.view());
   const Array<double, 1> edge = selected_items(places.edge_px, own.markers.view());
   const Array<bool, 1> agreed = selected_items(places.agreed, own.markers.view());
   const Array<bool, 1> is_intact = selected_items(places.is_intact, own.markers.view());
   const StartPlaces around{start, edge, agreed, is_intact};
-  auto [xy, cov] = accepted_markers(measured, with_curving(information, system, step.information),
-                                    read.bend_variance.slice(0, count), own.ends, own.spokes, around, asked,
-                                    limits.acceptance);
+  auto [xy, cov] = accepted_markers(measured, information, read.bend_variance.slice(0, count), own.ends,
+                                    own.spokes, around, asked, limits.acceptance);
   update_obstructed_markers(xy, cov, asked, around, limits.hidden);
   for (Index k = 0; k < asked.size(); ++k) {
     if (!asked[k]) continue;

@@ -48,7 +48,7 @@ StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& grad
                         const DrawnMarkers& drawn, bool overlapping, const StepLimits& limits) {
   const auto lines = system.lines;
   const auto edges = system.edges;
-  const InformationArrays information =
+  InformationArrays information =
       fisher_information(system, prior_information(drawn.hidden, limits), overlapping, limits.information);
   const Array<double, 2> right = gradient(system, gradients.start, gradients.end);
   const Array<double, 2> shift =
@@ -58,8 +58,7 @@ StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& grad
   ShiftedMarkers markers =
       markers_after_shift(drawn.xy, shift, least, system.weight, system.spokes, limits.weights);
   return {std::move(markers.measured), std::move(markers.reliable),
-          bend_after_shift(bend, bend_response, shift, lines, edges, limits.bending),
-          with_curving(information, system, limits.information)};
+          bend_after_shift(bend, bend_response, shift, lines, edges, limits.bending), std::move(information)};
 }
 
 WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,
@@ -68,7 +67,10 @@ WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients
                               const StepLimits& limits) {
   WeighedSolution out{Array<double, 1>({system.weight.size()}, 1.0),
                       solve_step(system, gradients, bend, bend_response, drawn, overlapping, limits)};
-  if (!judged) return out;
+  if (!judged) {
+    update_to_curving(out.solution.information, system, limits.information);
+    return out;
+  }
   Array<double, 2> shift(drawn.xy.shape());
   for (Index m = 0; m < shift.size(); ++m) {
     for (Index axis = 0; axis < 2; ++axis)
@@ -80,6 +82,7 @@ WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients
   GridlineSystem weighed = system;
   weighed.weight = weight;
   out.solution = solve_step(weighed, gradients, bend, bend_response, drawn, overlapping, limits);
+  update_to_curving(out.solution.information, weighed, limits.information);
   return out;
 }
 

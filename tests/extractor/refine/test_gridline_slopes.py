@@ -88,4 +88,12 @@ def test_scatter_bends_gridlines_as_random_markers_do(pattern: str) -> None:
         np.add.at(pull, edges, (across * 0.5 * (leave - arrive)[:, None])[:, None])
         squares += (np.linalg.solve(sums, pull[..., None]) ** 2).sum(axis=(1, 2)) / draws
     known = 0.25 * np.trace(sums, axis1=1, axis2=2)
+    if pattern == "honeycomb":
+        layer = layout.layer[edges]
+        inside, outside = (
+            (layer < layout.layer.max() - 2).all(axis=1),
+            (layer == layout.layer.max()).any(axis=1),
+        )
+        means = [float(topology.scatter_bending[chosen, 2].mean()) for chosen in (inside, outside)]
+        assert means == pytest.approx([0.083, 0.3], abs=0.03)
     assert topology.scatter_bending[:, 2].mean() == pytest.approx((known * squares)[edges].mean(), rel=0.1)

@@ -134,17 +134,14 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
   return out;
 }
 
-InformationArrays with_curving(const InformationArrays& of_step, const GridlineSystem& system,
-                               const InformationLimits& limits) {
-  InformationArrays out{Array<double, 2>(of_step.diagonal.view()),
-                        Array<double, 2>(of_step.off_diagonal.view())};
+void update_to_curving(InformationArrays& information, const GridlineSystem& system,
+                       const InformationLimits& limits) {
   const double coupling = limits.step_coupling * (1.0 - system.scatter_share);
   for (Index e = 0; e < system.edges.size(); ++e) {
     const auto own = system.curving[e];
-    add_gridline(system, e, own[0] - coupling, own[1] - coupling, own[BETWEEN] + coupling, out.diagonal,
-                 out.off_diagonal);
+    add_gridline(system, e, own[0] - coupling, own[1] - coupling, own[BETWEEN] + coupling,
+                 information.diagonal, information.off_diagonal);
   }
-  return out;
 }
 
 Array<double, 2> gradient(const GridlineSystem& system, View<const double, 1> gradient_start,

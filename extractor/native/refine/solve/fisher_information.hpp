@@ -67,9 +67,9 @@ Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
 InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
                                      bool overlapping, const InformationLimits& limits);
 
-// The information of a step with gridlines that curve as the system says, for covariances.
-InformationArrays with_curving(const InformationArrays& of_step, const GridlineSystem& system,
-                               const InformationLimits& limits);
+// Changes the information of a step to that of gridlines that curve as the system says, for covariances.
+void update_to_curving(InformationArrays& information, const GridlineSystem& system,
+                       const InformationLimits& limits);
 
 // (M, 2) 1/px, the gradient of the log-likelihood at each marker.
 //
