@@ -64,7 +64,7 @@ def squares_of(preset: str, kind: str) -> FoundSquares:
 def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> None:
     d2 = squares_of(preset, kind).inner
     found = summarise(d2)
-    least, most = {"fast": (0.85, 1.3), "balanced": (0.9, 1.15), "accurate": (0.9, 1.1)}[preset]
+    least, most = {"fast": (0.8, 1.15), "balanced": (0.83, 1.15), "accurate": (0.9, 1.1)}[preset]
     assert least < found.z.value < most
     assert 0.8 < found.median_z < 1.2  # the bulk of them, too
     # six deviations per axis; fast leaves a marker whose triangles were wrong by a quarter of a pixel
