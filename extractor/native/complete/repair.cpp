@@ -43,6 +43,8 @@ Array<double, 1> interpolated_edges(View<const double, 1> edge_px, View<const st
 }
 
 // The variance of a lost marker's place by the two rings around it, px^2; NaN where the place is not safe.
+//
+// What the neighbours' noise does not explain of their misfit is the surface's departure from the map.
 double variance_by_neighbours(Index m, const MarkerPredictions& rings, double edge_px,
                               const RepairLimits& limits) {
   const double variance = rings.variance_px2[m], leverage = rings.leverage[m];
@@ -50,7 +52,8 @@ double variance_by_neighbours(Index m, const MarkerPredictions& rings, double ed
   if (rings.neighbour_count[m] < limits.mild_support ||
       !(leverage < limits.max_leverage && upper_bound < square(limits.max_repaired_deviation * edge_px)))
     return NOT_A_NUMBER;
-  return square(limits.mild_error * leverage) * variance;
+  const double departure = std::max(variance - rings.neighbour_noise_px2[m], 0.0);
+  return rings.noise_px2[m] + square(limits.mild_error * leverage) * departure;
 }
 
 // The same by the quadratic through the marker's layer, from the variance of its residual, px^2.
@@ -130,7 +133,10 @@ class Repair {
  private:
   // by two rings, NaN where unknown
   MarkerPredictions predictions(View<const bool, 1> wanted) const {
-    return localmap::predict_markers(known_, wanted, tables_.marker_mm, tables_.neighbours, limits_.maps);
+    Array<double, 1> noise_px2({count_});
+    for (Index m = 0; m < count_; ++m) noise_px2[m] = 0.5 * (cov_(m, 0, 0) + cov_(m, 1, 1));
+    return localmap::predict_markers(known_, noise_px2, wanted, tables_.marker_mm, tables_.neighbours,
+                                     limits_.maps);
   }
 
   template <class Visit>
