@@ -10,10 +10,12 @@ namespace cmp::refine {
 // Limits of the offsets; explained in extractor/refine/measure/gridline_offsets.py.
 struct OffsetLimits {
   double clear_sigma, min_weight_sum, min_offset_weight, band;
+  std::int64_t min_profile_gridlines;
 
   template <class F>
   static OffsetLimits read(const F& f) {
-    return {f["clear_sigma"], f["min_weight_sum"], f["min_offset_weight"], f["band"]};
+    return {f["clear_sigma"], f["min_weight_sum"], f["min_offset_weight"], f["band"],
+            f["min_profile_gridlines"]};
   }
 };
 
@@ -40,7 +42,8 @@ struct GridlineReading {
 // The offsets of the gridlines around their virtual markers, count of each gridline.
 //
 // model (H, W, 3), the light of the drawn pattern; empty where no pattern was drawn.
-// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain; px^2, its variance. NaN where the
+// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain and of the ink's profile; px^2, its
+// variance. NaN where the
 // gridline has no contrast or little weight or leaves the image, or where another gridline is near what was
 // not drawn.
 Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const float, 3> model,
