@@ -18,7 +18,7 @@ struct RepairLimits {
   std::int64_t mild_support, min_rim_support;
   double max_repaired_deviation, max_fitted_deviation, max_leverage, max_rim_leverage;
   double model_deviation, fitted_model_sigmas;
-  double mild_error, heavy_error;
+  double mild_error;
   LayerLimits layers;
   layout::NeighbourMapLimits maps;
 
@@ -37,7 +37,6 @@ struct RepairLimits {
             f["model_deviation"],
             f["fitted_model_sigmas"],
             f["mild_error"],
-            f["heavy_error"],
             f["layers"],
             f["maps"]};
   }

@@ -163,6 +163,9 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
   const Array<bool, 1> agreed = selected_items(places.agreed, own.markers.view());
   const Array<bool, 1> is_intact = selected_items(places.is_intact, own.markers.view());
   const StartPlaces around{start, edge, agreed, is_intact};
+  update_curving(information, system,
+                 curving(selected_rows(topology.covariance_couplings, numbers), state.scatter.share,
+                         read.bend_response));
   auto [xy, cov] = accepted_markers(measured, information, read.bend_variance.slice(0, count), own.ends,
                                     own.spokes, around, asked, limits.acceptance);
   update_obstructed_markers(xy, cov, asked, around, limits.hidden);

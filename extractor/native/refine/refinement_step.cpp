@@ -105,7 +105,11 @@ WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients
   GridlineSystem weighed = system;
   weighed.weight = weight;
   Equations judged(weighed, gradients, curved.hidden, true, limits);
-  return {std::move(ratio), judged.solution(std::move(shift), bent.others, bend, curved)};
+  WeighedSolution out{std::move(ratio), judged.solution(std::move(shift), bent.others, bend, curved)};
+  const Array<double, 2> of_covariance =
+      curving(curved.topology.covariance_couplings, system.scatter_share, curved.bend_response);
+  update_curving(out.solution.information, weighed, of_covariance);
+  return out;
 }
 
 SolutionArrays as_tuple(StepSolution&& solution) {

@@ -1,4 +1,9 @@
-"""Offsets of the gridlines at virtual markers, measured at the last comparison of the image with the pattern."""
+"""Offsets of the gridlines at virtual markers, measured at the last comparison of the image with the pattern.
+
+Rounded corners, halos and inks whose response differs shift the sides of all cells alike, by an amount that depends on
+the ink and on the place along the side: its profile. A profile is no shape of the surface, because colored cells lie on
+alternate sides of the gridlines. The median profile of each ink over the picture is removed from the offsets.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +25,13 @@ class OffsetLimits(NamedTuple):
         min_offset_weight: of a gridline, for its offsets to be measured. Chosen.
         band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
             ``PixelRowLimits``.
+        min_profile_gridlines: of an ink; with no more, its profile is taken as 0. Chosen, as for the dot gain.
     """
 
     min_weight_sum: float = 0.08
     min_offset_weight: float = 0.4
     band: float = PIXEL_LIMITS.band
+    min_profile_gridlines: int = 40
 
 
 LIMITS = OffsetLimits()

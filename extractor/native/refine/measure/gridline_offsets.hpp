@@ -10,10 +10,11 @@ namespace cmp::refine {
 // Limits of the offsets; explained in extractor/refine/measure/gridline_offsets.py.
 struct OffsetLimits {
   double min_weight_sum, min_offset_weight, band;
+  Index min_profile_gridlines;
 
   template <class F>
   static OffsetLimits read(const F& f) {
-    return {f["min_weight_sum"], f["min_offset_weight"], f["band"]};
+    return {f["min_weight_sum"], f["min_offset_weight"], f["band"], f["min_profile_gridlines"]};
   }
 };
 
@@ -38,8 +39,8 @@ struct GridlineReading {
 // The offsets of the gridlines around their virtual markers, count of each gridline.
 //
 // model (H, W, 3), the light of the drawn pattern.
-// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain; px^2, its variance. NaN where the
-// gridline has no contrast or little weight or leaves the image.
+// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain and of the ink's profile; px^2, its
+// variance. NaN where the gridline has no contrast or little weight or leaves the image.
 Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const float, 3> model,
                                  const GridlineReading& reading, Index count, const OffsetLimits& limits);
 

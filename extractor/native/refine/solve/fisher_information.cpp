@@ -80,22 +80,22 @@ Array<std::int64_t, 1> known_markers(View<const double, 2> diagonal, double min_
   return out.first(count);
 }
 
-// Adds the sums of gridline e.
-void add_gridline(const GridlineSystem& system, Index e, View<double, 2> diagonal,
-                  View<double, 2> off_diagonal) {
-  const auto lines = system.lines[e], sums = system.sums[e], curved = system.curving[e];
+// Adds the sums of gridline e, times factors for its start, its end and the two with each other.
+void add_gridline(const GridlineSystem& system, Index e, const std::array<double, COUPLINGS>& factors,
+                  View<double, 2> diagonal, View<double, 2> off_diagonal) {
+  const auto lines = system.lines[e], sums = system.sums[e];
   const double w = system.weight[e] * lines[KNOWN] / system.variance;
   if (w == 0.0) return;
   const double nx = -lines[UY], ny = lines[UX];
   for (Index side = 0; side < 2; ++side) {
     const auto block = diagonal[system.edges(e, side)];
-    const double value = w * (1.0 + curved[side]) * (side == 0 ? sums[AA] : sums[BB]);
+    const double value = w * factors[side] * (side == 0 ? sums[AA] : sums[BB]);
     block[0] += value * nx * nx;
     block[1] += value * nx * ny;
     block[2] += value * ny * ny;
   }
   const auto block = off_diagonal[e];
-  const double value = w * (1.0 + curved[BETWEEN]) * sums[AB];
+  const double value = w * factors[BETWEEN] * sums[AB];
   block[0] += value * nx * nx;
   block[1] += value * nx * ny;
   block[2] += value * ny * nx;
@@ -127,9 +127,21 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     diagonal(m, 0) = diagonal(m, 2) = prior[m];
     diagonal(m, 1) = 0.0;
   }
-  for (Index e = 0; e < edges.size(); ++e) add_gridline(system, e, diagonal, off_diagonal);
+  for (Index e = 0; e < edges.size(); ++e) {
+    const auto own = system.curving[e];
+    add_gridline(system, e, {1.0 + own[0], 1.0 + own[1], 1.0 + own[BETWEEN]}, diagonal, off_diagonal);
+  }
   if (overlapping) add_shared_pixels(system, diagonal, off_diagonal, limits.shared);
   return out;
+}
+
+void update_curving(InformationArrays& information, const GridlineSystem& system,
+                    View<const double, 2> curving) {
+  for (Index e = 0; e < system.edges.size(); ++e) {
+    const auto own = system.curving[e], other = curving[e];
+    add_gridline(system, e, {other[0] - own[0], other[1] - own[1], other[BETWEEN] - own[BETWEEN]},
+                 information.diagonal, information.off_diagonal);
+  }
 }
 
 Array<double, 2> gradient(const GridlineSystem& system, View<const double, 1> gradient_start,

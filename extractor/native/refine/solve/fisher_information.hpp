@@ -66,6 +66,10 @@ Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
 InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
                                      bool overlapping, const InformationLimits& limits);
 
+// Changes the information to that of gridlines with this curving (E, 3) in the place of the system's.
+void update_curving(InformationArrays& information, const GridlineSystem& system,
+                    View<const double, 2> curving);
+
 // (M, 2) 1/px, the gradient of the log-likelihood at each marker.
 //
 // gradient_start, gradient_end (E,) squared gray levels / px, along the normal of each gridline at its ends.
