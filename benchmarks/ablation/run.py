@@ -192,7 +192,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.publish:
         named = "".join(f' --rule "{name}"' for name in options.rule or ())
         command = f"python -m benchmarks.ablation --preset {options.preset} --pictures {options.pictures} --seed {seed}"
-        for path in publish(rows, command + named):
+        for path in publish(rows, command + named, seed):
             print(f"wrote {path}")
     return 0
 
