@@ -49,14 +49,6 @@ IMAGE = (
         "mask.fill(1);",
     ),
     Rule(
-        "pale pixels",
-        "pale pixels are excluded from the inks' hues",
-        "accuracy",
-        "extractor/image/color.py",
-        "strong_quantile: float = 0.98",
-        "strong_quantile: float = 0.0",
-    ),
-    Rule(
         "local levels",
         "the level of an ink is local",
         "accuracy",
