@@ -120,16 +120,8 @@ COMPLETE = (
         "lost markers are predicted from uncertain markers, too",
         "accuracy",
         "extractor/native/complete/repair.cpp",
-        "if (is_any(lost_) && is_any(Flags(markers_.uncertain))) {",
-        "if (false) {",
-    ),
-    Rule(
-        "repair by cells",
-        "a lost marker is repaired by the corners that its cells imply",
-        "accuracy",
-        "extractor/complete/repair.py",
-        "max_implied_distance: float = 0.1",
-        "max_implied_distance: float = 0.0",
+        "if (is_any(lost_) && is_any(Flags(markers_.uncertain))) fill",
+        "if (false) fill",
     ),
     Rule(
         "repair by layer",
