@@ -88,16 +88,8 @@ COMPLETE = (
         "the tolerance is narrower where synthesis does not explain the image",
         "accuracy",
         "extractor/native/complete/consistency_filter.cpp",
-        "allowed = limits.max_unexplained_distance;",
-        "allowed = limits.max_distance;",
-    ),
-    Rule(
-        "agreed unexplained",
-        "the tolerance is slightly narrower where triangles agree and synthesis does not explain the image",
-        "accuracy",
-        "extractor/native/complete/consistency_filter.cpp",
-        "allowed = limits.max_agreed_unexplained_distance;",
-        "allowed = limits.max_distance;",
+        "confirmed ? limits.max_distance : limits.max_unexplained_distance;",
+        "limits.max_distance;",
     ),
     Rule(
         "confirmed",
