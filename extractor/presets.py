@@ -15,7 +15,7 @@ class Schedule(NamedTuple):
         max_profile_rows: rows of pixels across each gridline at most, in the round of profiles.
         reduction_blur_px: blur (sigma, px) down to which the image may be reduced; blurred images need no fine pixels.
         small_remainder: standard deviations, the error that a step typically leaves (``remaining_share``) at which no
-            step follows, if nothing but the markers has changed. Errors rise by half of its square at most: by 5 %
+            step follows, if nothing but the markers has changed. Errors rise by half of its square at most: by 3 %
             (balanced). Measured: rule "small remainder".
     """
 
@@ -25,7 +25,7 @@ class Schedule(NamedTuple):
 
 
 SCHEDULES: dict[Preset, Schedule] = {
-    "fast": Schedule(2, 0.5, 1.0),
-    "balanced": Schedule(6, 0.5, 0.3),
+    "fast": Schedule(2, 0.5, 0.5),
+    "balanced": Schedule(6, 0.5, 0.25),
     "accurate": Schedule(8, 1.2, 0.05),
 }

@@ -98,10 +98,10 @@ def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
     return estimate._replace(**extrapolate_pattern(estimate.reliable, topology)._asdict())
 
 
-def scatter_of(topology: Topology, estimate: Estimate, *, by_synthesis: bool) -> MarkerScatter:
-    """The scatter of the estimate's markers, which a step by synthesis has placed, or profiles."""
+def scatter_of(topology: Topology, estimate: Estimate) -> MarkerScatter:
+    """The scatter of the estimate's markers."""
     markers = estimate.reliable, estimate.maps, estimate.information.diagonal
-    return measure_scatter(*markers, topology, by_synthesis=by_synthesis)
+    return measure_scatter(*markers, topology)
 
 
 def with_bending(topology: Topology, estimate: Estimate, scatter: MarkerScatter) -> Estimate:

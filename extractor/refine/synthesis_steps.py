@@ -55,9 +55,6 @@ class SynthesisLimits(NamedTuple):
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
             follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
             0.15 in the second step. Measured: rule "settled appearance".
-        full_weight: of a gridline; with less it looks unlike the pattern. Chosen.
-        few_doubted: share of such gridlines, below which no step may follow. Clean pictures have none, slips and dirt
-            1 % and more. Measured: rule "doubted gridlines".
         small_bend: RMS change of the gridlines' bending in a step after which no step may follow, in deviations of a
             marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
     """
@@ -67,8 +64,6 @@ class SynthesisLimits(NamedTuple):
     step: StepLimits = STEP_LIMITS
     dot_gain: DotGainLimits = DOT_GAIN_LIMITS
     small_change: float = 0.05
-    full_weight: float = 0.9
-    few_doubted: float = 0.005
     small_bend: float = 2.0
 
 
@@ -142,8 +137,8 @@ class SynthesisSolver:
             schedule: the error that a step may leave for no step to follow.
         """
         shift = np.full_like(estimate.xy, np.nan)
-        for step in range(LIMITS.max_steps):
-            before = self._drawn(estimate, by_synthesis=step > 0)
+        for _ in range(LIMITS.max_steps):
+            before = self._drawn(estimate)
             estimate, drawing = self._full_step(view, before)
             last, shift = shift, estimate.measured - drawing.xy
             share = remaining_share(drawing.sigma, drawing.edge_px)
@@ -153,7 +148,7 @@ class SynthesisSolver:
                 break
         return estimate._replace(convergence_cov_px2=cov)
 
-    def _drawn(self, estimate: Estimate, *, by_synthesis: bool) -> Estimate:
+    def _drawn(self, estimate: Estimate) -> Estimate:
         """The estimate with its pattern at the markers of the last step, and with gridlines that may bend.
 
         With wide blur, gridlines would bend instead of correcting the markers beside them.
@@ -161,28 +156,23 @@ class SynthesisSolver:
         moved = with_pattern_moved(self._topology, estimate)
         if is_blur_wide(moved.sigma, median_edge(moved.xy, self._topology.edges)):
             return _without_bending(moved)
-        return with_bending(
-            self._topology, moved, scatter_of(self._topology, moved, by_synthesis=by_synthesis)
-        )
+        return with_bending(self._topology, moved, scatter_of(self._topology, moved))
 
     def _is_settled(self, before: Estimate, after: Estimate, drawing: Synthesis) -> bool:
         """Whether the next drawing would differ from the last one by small moves of the markers only.
 
-        Blur or dot gain that has changed, gridlines that look unlike the pattern or bend, and markers that scatter are
-        drawn otherwise.
+        Blur or dot gain that has changed, gridlines that bend, and markers that scatter are drawn otherwise.
         """
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
         read = drawing.sums[:, READ_SUM] > 0.0
         if change_px >= LIMITS.small_change * before.sigma or not read.any():
-            return False
-        if np.mean(after.weight[read] < LIMITS.full_weight) >= LIMITS.few_doubted:
             return False
         if is_blur_wide(before.sigma, drawing.edge_px):
             return True
         bend_px = np.sqrt(np.mean((after.bend[read] - before.bend[read]) ** 2))
         if bend_px >= LIMITS.small_bend * typical_deviation(after.information):
             return False
-        return scatter_of(self._topology, after, by_synthesis=True) == NO_SCATTER
+        return scatter_of(self._topology, after) == NO_SCATTER
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
         """A step from all measurements."""

@@ -49,14 +49,6 @@ REFINEMENT = (
         "small_change: float = np.inf",
     ),
     Rule(
-        "doubted gridlines",
-        "a step follows while gridlines look unlike the pattern",
-        "errors and time",
-        "extractor/refine/synthesis_steps.py",
-        "few_doubted: float = 0.005",
-        "few_doubted: float = np.inf",
-    ),
-    Rule(
         "bent gridlines",
         "a step follows one that bent gridlines",
         "errors and time",
@@ -69,7 +61,7 @@ REFINEMENT = (
         "a step follows while markers scatter",
         "errors and time",
         "extractor/refine/synthesis_steps.py",
-        "return scatter_of(self._topology, after, by_synthesis=True) == NO_SCATTER",
+        "return scatter_of(self._topology, after) == NO_SCATTER",
         "return True",
     ),
     Rule(
@@ -79,14 +71,6 @@ REFINEMENT = (
         "extractor/refine/measure/marker_scatter.py",
         "return MarkerScatter(*found)",
         "return NO_SCATTER",
-    ),
-    Rule(
-        "scatter of profiles",
-        "what profiles leave is not taken for scatter",
-        "errors and time",
-        "extractor/refine/measure/marker_scatter.py",
-        "start_allowance: float = 100.0",
-        "start_allowance: float = 2.0",
     ),
 )
 

@@ -55,8 +55,6 @@ class ScatterLimits(NamedTuple):
         noise_allowance: stated variances of a marker that are noise, not scatter. On the flat patterns of that suite
             fourth differences ask for 1.0 to 1.5, in steep views for 7 after the first step; a scatter of 0.05 px makes
             40 to 60. Measured: rule "scatter".
-        start_allowance: the same before the first step by synthesis, where markers are as profiles left them: dirt of
-            the suite "damage" asks for up to 61 there. Measured: rule "scatter of profiles".
         quantile: of the squared differences, by which their variance is measured: scatter is everywhere, and rims,
             slips and dirt are somewhere. By the median, a slip of a tenth of an edge on a pattern of 4 layers was taken
             for scatter, and its errors rose by a half. Measured: rule "scatter".
@@ -64,7 +62,6 @@ class ScatterLimits(NamedTuple):
 
     smooth_ratio: float = 1.5
     noise_allowance: float = 8.0
-    start_allowance: float = 100.0
     quantile: float = 0.25
 
 
@@ -76,8 +73,6 @@ def measure_scatter(
     maps: NDArray[np.float64],
     diagonal: NDArray[np.float64],
     topology: Topology,
-    *,
-    by_synthesis: bool,
 ) -> MarkerScatter:
     """The scatter of the markers of a picture.
 
@@ -86,7 +81,6 @@ def measure_scatter(
         maps: (M, 2, 5), as ``local_maps`` gives them.
         diagonal: (M, 3) 1/px^2, the information's diagonal blocks.
         topology: of the layout.
-        by_synthesis: the markers were placed by a step by synthesis; else by profiles.
     """
-    found = native.measure_scatter(xy, maps, diagonal, topology, by_synthesis, LIMITS)
+    found = native.measure_scatter(xy, maps, diagonal, topology, LIMITS)
     return MarkerScatter(*found)

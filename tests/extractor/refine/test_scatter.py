@@ -30,11 +30,11 @@ def pattern() -> tuple[NDArray[np.float64], Topology]:
     return layout.xy_mm / 1.5, topology_of(layout)
 
 
-def scatter_of(xy: NDArray[np.float64], topology: Topology, by_synthesis: bool = True) -> MarkerScatter:
+def scatter_of(xy: NDArray[np.float64], topology: Topology) -> MarkerScatter:
     """The scatter of markers that are measured with a noise of ``NOISE_PX``."""
     maps = local_maps(xy, topology.ring_markers, topology.ring_vectors, topology.derivative_stencil)
     information = np.tile([NOISE_PX**-2, 0.0, NOISE_PX**-2], (len(xy), 1))
-    return measure_scatter(xy, maps, information, topology, by_synthesis=by_synthesis)
+    return measure_scatter(xy, maps, information, topology)
 
 
 def bulged(xy: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -52,12 +52,11 @@ def test_scatter_is_told_from_a_smooth_surface(scatter_px: float) -> None:
     assert scatter_of(bulged(xy), topology) == NO_SCATTER
 
 
-def test_noise_and_what_profiles_leave_are_no_scatter() -> None:
+def test_noise_is_no_scatter() -> None:
     xy, topology = pattern()
     noise = np.random.default_rng(0).normal(0.0, NOISE_PX, xy.shape)
     assert scatter_of(EDGE_PX * xy + noise, topology) == NO_SCATTER
     assert scatter_of(EDGE_PX * xy + 5 * noise, topology).share > 0.5
-    assert scatter_of(EDGE_PX * xy + 5 * noise, topology, by_synthesis=False) == NO_SCATTER
 
 
 @pytest.mark.parametrize("preset", ["balanced", "accurate"])

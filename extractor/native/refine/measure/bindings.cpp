@@ -11,8 +11,7 @@ namespace cmp::refine {
 void add_measure(nb::module_ module) {
   bind<&measure_roughness>(module, "measure_roughness",
                            {"xy", "maps", "diagonal", "rows", "spokes", "near", "limits"});
-  bind<&measure_scatter>(module, "measure_scatter",
-                         {"xy", "maps", "diagonal", "topology", "by_synthesis", "limits"});
+  bind<&measure_scatter>(module, "measure_scatter", {"xy", "maps", "diagonal", "topology", "limits"});
   bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count", "limits"});
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
   bind<&short_edge>(module, "short_edge", {"xy", "edges", "rarity"});

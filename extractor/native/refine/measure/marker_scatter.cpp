@@ -83,14 +83,13 @@ Array<ThirdDifference, 1> fourth_differences(View<const ThirdDifference, 1> thir
 
 ScatterFigures measure_scatter(View<const double, 2> xy, View<const double, 3> maps,
                                View<const double, 2> diagonal, const layout::Topology& topology,
-                               bool by_synthesis, const ScatterLimits& limits) {
+                               const ScatterLimits& limits) {
   const Array<ThirdDifference, 1> third = third_differences(xy, maps, topology);
   const Variances of_third = variances_of(third, limits.quantile);
   const Variances of_fourth = variances_of(fourth_differences(third, topology), limits.quantile);
   const double independent = (of_fourth.low - limits.smooth_ratio * of_third.low) /
                              (FOURTH_DIFFERENCE_SQUARES - limits.smooth_ratio * THIRD_DIFFERENCE_SQUARES);
-  const double allowance = by_synthesis ? limits.noise_allowance : limits.start_allowance;
-  const double variance = independent - allowance * median_noise(diagonal);
+  const double variance = independent - limits.noise_allowance * median_noise(diagonal);
   if (!(variance > 0.0)) return {0.0, 0.0};
   return {variance, std::min(FOURTH_DIFFERENCE_SQUARES * variance / of_fourth.median, 1.0)};
 }

@@ -28,11 +28,11 @@ struct MarkerScatter {
 
 // Limits of scatter; explained in extractor/refine/measure/marker_scatter.py.
 struct ScatterLimits {
-  double smooth_ratio, noise_allowance, start_allowance, quantile;
+  double smooth_ratio, noise_allowance, quantile;
 
   template <class F>
   static ScatterLimits read(const F& f) {
-    return {f["smooth_ratio"], f["noise_allowance"], f["start_allowance"], f["quantile"]};
+    return {f["smooth_ratio"], f["noise_allowance"], f["quantile"]};
   }
 };
 
@@ -42,9 +42,9 @@ using ScatterFigures = std::tuple<double, double>;
 // The scatter, from the third and fourth differences of the markers along their gridlines.
 //
 // xy (M, 2) px, NaN where unknown; maps (M, 2, 5), as local_maps gives them; diagonal (M, 3) 1/px^2, the
-// information's diagonal blocks; by_synthesis, a step by synthesis has placed the markers.
+// information's diagonal blocks.
 ScatterFigures measure_scatter(View<const double, 2> xy, View<const double, 3> maps,
                                View<const double, 2> diagonal, const layout::Topology& topology,
-                               bool by_synthesis, const ScatterLimits& limits);
+                               const ScatterLimits& limits);
 
 }  // namespace cmp::refine
