@@ -1,4 +1,7 @@
-"""What the trials found, as docs/measured/ablation.json and as tables: a row for each rule that was ever tried."""
+"""What the trials found, as docs/measured/ablation.json and as tables.
+
+A row is a rule that was ever tried, on the pictures of one seed.
+"""
 
 from __future__ import annotations
 
@@ -21,32 +24,44 @@ def comparison_row(found: Comparison) -> dict[str, Any]:
     return {**found._asdict(), **changes, **named, "verdict": found.verdict}
 
 
-def publish(rows: Iterable[Mapping[str, Any]], command: str) -> list[Path]:
+def publish(rows: Iterable[Mapping[str, Any]], command: str, seed: int) -> list[Path]:
     """Put the rows beside those of the rules that were tried earlier. Returns the written files."""
     earlier = read_measured(NAME)["rows"] if (MEASURED_FOLDER / f"{NAME}.json").exists() else []
-    kept = {row["rule"]: row for row in earlier}
-    for row in rows:
-        kept.pop(row["rule"], None)
-        kept[row["rule"]] = {**row, "command": command}
-    measured = {"rows": list(kept.values())}
+    own = [{**row, "command": command, "seed": seed} for row in rows]
+    measured = {"rows": merged_rows(earlier, own)}
     return write_published(NAME, measured, documentation_blocks(measured))
+
+
+def merged_rows(
+    earlier: Iterable[Mapping[str, Any]], rows: Iterable[Mapping[str, Any]]
+) -> list[Mapping[str, Any]]:
+    """The rows of a rule one after another, the rules in the order of their first row.
+
+    A row replaces the earlier one of the same rule and seed.
+    """
+    by_rule: dict[str, dict[int, Mapping[str, Any]]] = {}
+    for row in (*earlier, *rows):
+        of_rule = by_rule.setdefault(row["rule"], {})
+        of_rule.pop(row["seed"], None)
+        of_rule[row["seed"]] = row
+    return [row for of_rule in by_rule.values() for row in of_rule.values()]
 
 
 def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
     """The tables of docs/explanation/rules.md from the content of docs/measured/ablation.json."""
     rows = measured["rows"]
     lines = [
-        "| rule | of | pictures | changed | wrong ids | wrong positions | lost, % | RMS, % | typical RMS, % "
+        "| rule | of | seed | pictures | changed | wrong ids | wrong positions | lost, % | RMS, % | typical RMS, % "
         "| by the figures | rule |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
         *(_line(row) for row in rows),
     ]
     timed = [row for row in rows if row["kind"] == "errors and time" and "beyond" in row]
     more = [
-        "| rule | z | beyond three deviations, % | processor time |",
-        "|---|---|---|---|",
+        "| rule | seed | z | beyond three deviations, % | processor time |",
+        "|---|---|---|---|---|",
         *(
-            f"| {row['rule']} | {row['z'][0]:.2f} > {row['z'][1]:.2f} "
+            f"| {row['rule']} | {row['seed']} | {row['z'][0]:.2f} > {row['z'][1]:.2f} "
             f"| {100 * row['beyond']['full']:.2f} > {100 * row['beyond']['without']:.2f} "
             f"| {row['time_ratio']:.2f} |"
             for row in timed
@@ -64,6 +79,7 @@ def _line(row: Mapping[str, Any]) -> str:
     cells = (
         row["rule"],
         row["stage"],
+        row["seed"],
         row["pictures"],
         row["touched"],
         *counts,

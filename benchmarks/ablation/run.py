@@ -1,6 +1,6 @@
 """The effect of each rule of the reader: every rule switched off in a copy of the reader, over the same pictures.
 
-    python -m benchmarks.ablation [--rule NAME ...] [--together] [--preset NAME] [--pictures N] [--seed S]
+    python -m benchmarks.ablation [--rule NAME ...] [--together [--kind KIND]] [--preset NAME] [--pictures N] [--seed S]
 
 A rule for accuracy is tried on the suites plain, stress, damage, scatter and camera together; a rule whose purpose is
 that no wrong id is reported, on pictures made to provoke wrong ids. A rule stays if it saves a wrong id, or if without
@@ -12,8 +12,8 @@ Wrong ids are at another marker's place, or in a picture without the pattern; wr
 shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both
 are judged. Differences are "without the rule" minus "with it". z is of all reported markers, time the ratio of
 processor times. Two rules may replace each other: with ``--together`` all named rules are switched off at once, in
-the pictures of both kinds. Rules in C++ need a compiler: every process builds a copy of the reader once, and for each
-such rule compiles the changed file.
+the pictures of both kinds, or of one ``--kind``. Rules in C++ need a compiler: every process builds a copy of the
+reader once, and for each such rule compiles the changed file.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ SUITES: dict[Kind, tuple[str, ...]] = {
     "errors and time": POOLED,
     "no wrong id": (PROVOKING,),
 }
+TOGETHER: tuple[Kind, ...] = ("accuracy", "no wrong id")  # whose pictures are of different suites
 PICTURES = 60  # of each suite
 HEAD = (
     f"{'rule':<22}{'stage':<11}{'kind':<13}{'pictures':>9}{'touched':>8}{'ids':>9}{'positions':>10}"
@@ -97,13 +98,15 @@ def try_rules(
         yield from pool.map(try_rule, rules)
 
 
-def try_together(rules: Sequence[Rule], pictures: Sequence[KeptPicture], preset: str) -> Iterable[Comparison]:
+def try_together(
+    rules: Sequence[Rule], kinds: Iterable[Kind], pictures: Sequence[KeptPicture], preset: str
+) -> Iterable[Comparison]:
     """For the suites of each kind, the comparison of the reader without all of the rules, named after the first."""
     with tempfile.TemporaryDirectory() as folder:
         copy = CodeCopy(Path(folder) / "copy")
         if any(rule.change.is_native for rule in rules):
             copy.build()
-        for kind in ("accuracy", "no wrong id"):
+        for kind in kinds:
             suites = SUITES[kind]
             own = [picture for picture in pictures if picture.suite in suites]
             full, without = (read_without(some, own, preset, copy) for some in ((), rules))
@@ -144,6 +147,9 @@ def main(arguments: list[str] | None = None) -> int:
         "--rule", action="append", choices=tuple(BY_NAME), metavar="NAME", help="all by default"
     )
     parser.add_argument("--together", action="store_true", help="switch the rules off all at once")
+    parser.add_argument(
+        "--kind", choices=TOGETHER, help="with --together, only in the pictures for rules of this kind"
+    )
     parser.add_argument("--preset", choices=tuple(PRESETS), default="balanced")
     parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of each suite")
     parser.add_argument("--seed", type=int, metavar="S", help="of all random choices")
@@ -162,12 +168,20 @@ def main(arguments: list[str] | None = None) -> int:
         seed = commit_seed() if options.seed is None else options.seed
     except ValueError as error:
         parser.error(str(error))
+    if options.kind and not options.together:
+        parser.error("--kind is for --together; a single rule has a kind of its own")
     if options.together and options.publish:
         parser.error("--together tells nothing of single rules; leave --publish out")
     if seed < 0:
         parser.error(f"--seed is {seed}; it must be 0 or more")
     started, found = time.perf_counter(), []
-    kinds = list(SUITES) if options.together else [rule.kind for rule in rules]
+    kinds = (
+        [options.kind]
+        if options.kind
+        else list(TOGETHER)
+        if options.together
+        else [rule.kind for rule in rules]
+    )
     suites = list(dict.fromkeys(suite for kind in kinds for suite in SUITES[kind]))
     with tempfile.TemporaryDirectory() as folder:
         pictures = [
@@ -177,7 +191,7 @@ def main(arguments: list[str] | None = None) -> int:
         ]
         print(HEAD, flush=True)
         comparisons: Iterable[Comparison] = (
-            try_together(rules, pictures, options.preset)
+            try_together(rules, kinds, pictures, options.preset)
             if options.together
             else try_rules(rules, pictures, options.preset, options.processes)
         )
@@ -192,7 +206,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.publish:
         named = "".join(f' --rule "{name}"' for name in options.rule or ())
         command = f"python -m benchmarks.ablation --preset {options.preset} --pictures {options.pictures} --seed {seed}"
-        for path in publish(rows, command + named):
+        for path in publish(rows, command + named, seed):
             print(f"wrote {path}")
     return 0
 

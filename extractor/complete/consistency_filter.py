@@ -26,8 +26,6 @@ class ConsistencyLimits(NamedTuple):
             outliers".
         max_distance: between a marker and its prediction by two rings. Measured:
             `python -m benchmarks.acceptance`.
-        max_agreed_unexplained_distance: the same where two triangles agree and synthesis explains nothing. Measured:
-            rule "agreed unexplained".
         max_predicted_deviation: of the prediction of a marker that only two triangles confirm. Measured: rule
             "confirmed".
         max_unexplained_distance: of a marker that is obstructed, and the deviation of its prediction. Measured: rule
@@ -36,8 +34,7 @@ class ConsistencyLimits(NamedTuple):
     """
 
     max_rounds: int = 40
-    max_distance: float = 0.15
-    max_agreed_unexplained_distance: float = 0.14
+    max_distance: float = 0.14
     max_predicted_deviation: float = 0.12
     max_unexplained_distance: float = 0.06
     maps: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS

@@ -43,18 +43,11 @@ class RepairLimits(NamedTuple):
     pressed and twisted patterns. The variance of a fitted marker has the same two parts (``layer_arcs``).
 
     Attributes:
-        max_implied_distance: between the place that cells imply and the prediction by markers. Measured: rule "repair
-            by cells".
-        implied_deviation: of a place that cells imply. Chosen.
-        max_implied_sigmas: deviations of this distance, from which on the two places contradict each other. Chosen.
-        border_width: of the image's border, which cuts cells; cells there imply nothing. Chosen.
         mild_support: known neighbours of two rings that make an omission mild. Chosen.
-        min_rim_support: known neighbours of a lost marker that cells imply. Chosen.
         max_repaired_deviation: of a repaired marker: three such deviations stay below a quarter of an edge. Derived.
         max_fitted_deviation: of a fitted marker: a layer's quadratic is wrong where the surface is bent. Measured: rule
             "repair by layer".
         max_leverage: of the neighbours' errors on a repaired marker. Measured: rule "repair by rings".
-        max_rim_leverage: the same on a marker that cells imply. Chosen.
         model_deviation: deviation of a smooth surface from a quadratic map. Chosen.
         fitted_model_sigmas: such deviations that are added to a layer's residual before it is compared with
             ``max_fitted_deviation``. Chosen.
@@ -64,16 +57,10 @@ class RepairLimits(NamedTuple):
         maps: limits of the predictions by neighbours.
     """
 
-    max_implied_distance: float = 0.1
-    implied_deviation: float = 0.02
-    max_implied_sigmas: float = 2.0
-    border_width: float = 0.25
     mild_support: int = 10
-    min_rim_support: int = 6
     max_repaired_deviation: float = 0.08
     max_fitted_deviation: float = 0.05
     max_leverage: float = 1.2
-    max_rim_leverage: float = 2.0
     model_deviation: float = 0.012
     fitted_model_sigmas: float = 3.0
     mild_error: float = 1.6
@@ -91,14 +78,12 @@ class UnrepairedMarkers(NamedTuple):
         xy_px, cov_px2: (M, 2) and (M, 2, 2) float64, NaN where lost; they are written.
         uncertain: (M,) bool.
         edge_px: (M,) float64, the edge at each marker.
-        implied_px: (M, 2) float64, the places before refinement, which the cells imply.
     """
 
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     uncertain: NDArray[np.bool_]
     edge_px: NDArray[np.float64]
-    implied_px: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +115,6 @@ def repair_markers(
     uncertain, any_uncertain = find_uncertain_markers(kept.cov_px2, kept.edge_px)
     if kept.is_complete and not any_uncertain:
         return RepairedMarkers(kept.xy_px, kept.cov_px2, np.isfinite(kept.xy_px[:, 0]) * MEASURED)
-    markers = UnrepairedMarkers(kept.xy_px, kept.cov_px2, uncertain, kept.edge_px, places.xy_px)
+    markers = UnrepairedMarkers(kept.xy_px, kept.cov_px2, uncertain, kept.edge_px)
     status = native.fill_lost_markers(markers, lattice.ring_tables, size, LIMITS)
     return RepairedMarkers(kept.xy_px, kept.cov_px2, status)

@@ -21,8 +21,6 @@ class HueLimits(NamedTuple):
         width_deg: degrees; pixels farther from every center do not count. Chosen.
         rounds: of the 3-means. Chosen.
         min_chroma: gray levels; below it, 8-bit hue is noise. Chosen.
-        strong_quantile: share of the colored pixels with less chroma than a strong one. Measured: rule "pale pixels".
-        pale_divisor: a pale pixel has less than this fraction (1/8) of the strong chroma. Measured: rule "pale pixels".
         ink_width_deg: degrees; hues as far from every ink belong to none. It is half of the distance of the nominal
             hues. Derived.
     """
@@ -31,8 +29,6 @@ class HueLimits(NamedTuple):
     width_deg: float = 40.0
     rounds: int = 8
     min_chroma: int = 12
-    strong_quantile: float = 0.98
-    pale_divisor: int = 8
     ink_width_deg: float = 60.0
 
 
@@ -67,7 +63,7 @@ def to_colors(image: NDArray[np.uint8]) -> Colors:
 
 
 def hue_weights(hue: NDArray[np.uint8], chroma: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """(180,) float64, the sum of the chroma of all pixels of each hue that are not pale; hue, chroma (H, W)."""
+    """(180,) float64, the sum of the chroma of all colored pixels of each hue; hue, chroma (H, W)."""
     return np.asarray(native.hue_weights(hue, chroma, LIMITS))
 
 

@@ -22,12 +22,10 @@ class LabelLimits(NamedTuple):
 
     Attributes:
         level_share: a pixel shows an ink when its chroma exceeds this share of the ink's local level. Chosen.
-        min_level_share: of an ink's typical level, the lowest local level. Measured: rule "lowest level".
         min_chroma: gray levels, the lowest chroma of an ink, as in ``HueLimits``. Derived.
     """
 
     level_share: float = 0.4
-    min_level_share: float = 0.15
     min_chroma: int = HUE_LIMITS.min_chroma
 
 

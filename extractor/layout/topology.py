@@ -50,7 +50,8 @@ class Topology(NamedTuple):
         third_differences: (E, 2) float64, the layout's third difference along these four markers, in the unit of
             ``ring_vectors``.
         next_edges: (M, 6) int32, the edge that follows each of the ``spokes`` on the same gridline.
-        end_couplings: (E, 6) float64, of the covariances, see ``gridline_slopes``.
+        end_couplings: (E, 6) float64, see ``gridline_slopes``.
+        covariance_couplings: (E, 6) float64, the same of the covariances.
         scatter_bending: (E, 3) float64, see ``gridline_slopes``.
     """
 
@@ -69,6 +70,7 @@ class Topology(NamedTuple):
     third_differences: NDArray[np.float64]
     next_edges: NDArray[np.int32]
     end_couplings: NDArray[np.float64]
+    covariance_couplings: NDArray[np.float64]
     scatter_bending: NDArray[np.float64]
 
 
@@ -97,6 +99,7 @@ def topology_of(layout: Reference) -> Topology:
     stencil = _derivative_stencil(ring_markers, ring_vectors)
     edge_vectors = chord / length.mean()
     slopes = slope_weights(stencil, ring_markers, edges, edge_vectors)
+    couplings = end_couplings(slopes, edges)
     is_inner: NDArray[np.bool_] = np.all(ring_markers >= 0, axis=1)
     is_seen: NDArray[np.bool_] = np.any(edge_cells >= 0, axis=1)
     gridlines = LayoutGridlines(edges, edge_vectors, is_seen, spokes, is_inner)
@@ -115,7 +118,8 @@ def topology_of(layout: Reference) -> Topology:
         next_markers=next_markers,
         third_differences=np.where(np.all(next_markers >= 0, axis=1)[:, None], third / length.mean(), 0.0),
         next_edges=_next_edges(spokes, edges, next_markers, key),
-        end_couplings=covariance_couplings(end_couplings(slopes, edges), slopes, gridlines),
+        end_couplings=couplings,
+        covariance_couplings=covariance_couplings(couplings, slopes, gridlines),
         scatter_bending=scatter_bending(slopes, edges, edge_vectors, spokes),
     )
 

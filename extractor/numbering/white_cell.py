@@ -1,4 +1,4 @@
-"""Decides whether a bright place is the white cell: white inside, not white outside, and between the right inks.
+"""Decides whether a bright place is the white cell: white inside and not white outside.
 
 The numbered cells predict place and size by a quadratic map from the layout to the image. A scratch across a black
 cell, a crossing of two scratches, a drop or a reflection fail the test, and so does the white cell one step aside.
@@ -66,9 +66,6 @@ class WhiteCellLimits(NamedTuple):
         max_outside: whiteness outside the cell. Measured: rule "white triangle".
         min_reach: whiteness above the ground, the least of the middle that the other places are compared with. Derived:
             it only keeps a division from failing.
-        min_ink_cosine: between a color and an ink, both minus black. Measured: rule "between inks".
-        min_ink_strength: of an ink's strength above black; weaker colors count as black, a missing cell. Measured: rule
-            "between inks".
         sample_radius: of a color sample, relative to the square root of the area spanned by the axial steps. Chosen.
         points: the places that are sampled.
     """
@@ -84,8 +81,6 @@ class WhiteCellLimits(NamedTuple):
     min_corner: float = 0.25
     max_outside: float = 0.5
     min_reach: float = 1e-3
-    min_ink_cosine: float = 0.9
-    min_ink_strength: float = 0.3
     sample_radius: float = 0.1
     points: WhiteCellPoints = WhiteCellPoints()
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.ablation.report import merged_rows
 from benchmarks.ablation.run import comparison_line, main, try_rules
 from benchmarks.suites.ablation.comparison import LEAST_LOSS, compare
 from benchmarks.suites.ablation.pictures import PatternTruth, keep_pictures, pattern_truth, sampled_cases
@@ -227,6 +228,12 @@ def test_a_suites_pictures_are_drawn_from_all_of_it() -> None:
         case.kind for case in sampled_cases("damage", 200, 2)
     }
     assert [case.kind for case in sampled_cases("damage", 30, 3)] != [case.kind for case in some]
+
+
+def test_a_rules_row_replaces_that_of_the_same_seed_and_stands_beside_the_others() -> None:
+    first = [{"rule": "a", "seed": 1, "lost": 0}, {"rule": "b", "seed": 1, "lost": 1}]
+    second = [{"rule": "a", "seed": 2, "lost": 2}, {"rule": "b", "seed": 1, "lost": 3}]
+    assert merged_rows(first, second) == [first[0], *second]
 
 
 def test_the_command_lists_its_rules_and_refuses_no_pictures(capsys: pytest.CaptureFixture[str]) -> None:

@@ -69,7 +69,7 @@ def squares_of(preset: str, kind: str) -> FoundSquares:
 def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> None:
     d2 = squares_of(preset, kind).inner
     found = summarise(d2)
-    least, most = {"fast": (0.85, 1.3), "balanced": (0.9, 1.15), "accurate": (0.9, 1.1)}[preset]
+    least, most = {"fast": (0.8, 1.15), "balanced": (0.83, 1.15), "accurate": (0.9, 1.1)}[preset]
     assert least < found.z.value < most
     assert 0.8 < found.median_z < 1.2  # the bulk of them, too
     # six deviations per axis; fast leaves a marker whose triangles were wrong by a quarter of a pixel
@@ -102,8 +102,8 @@ def test_the_covariance_of_an_interpolated_virtual_marker_holds_the_errors_of_th
     assert 0.9 < found.z.value < 1.15
 
 
-@pytest.mark.parametrize(("preset", "limit_px"), [("fast", 0.08), ("balanced", 0.2)])
-def test_virtual_markers_between_rounded_cells_lie_on_the_gridlines(preset: str, limit_px: float) -> None:
+@pytest.mark.parametrize("preset", ["fast", "balanced"])
+def test_virtual_markers_between_rounded_cells_lie_on_the_gridlines(preset: str) -> None:
     """The sides of all cells are shifted alike, most at their ends. With these shifts, errors would be two to three
     times as large.
     """
@@ -117,7 +117,7 @@ def test_virtual_markers_between_rounded_cells_lie_on_the_gridlines(preset: str,
             error = (markers.virtual_xy_px - seen.truths[0].virtual_xy_px)[mine]
             d2.append(squared_distances(error, markers.virtual_cov_px2[mine]))
             squares.append((error**2).mean(axis=1))
-    assert np.sqrt(np.concatenate(squares).mean()) < limit_px
+    assert np.sqrt(np.concatenate(squares).mean()) < 0.2
     assert 0.6 < summarise(d2).z.value < 1.1
 
 

@@ -49,28 +49,12 @@ IMAGE = (
         "mask.fill(1);",
     ),
     Rule(
-        "pale pixels",
-        "pale pixels are excluded from the inks' hues",
-        "accuracy",
-        "extractor/image/color.py",
-        "strong_quantile: float = 0.98",
-        "strong_quantile: float = 0.0",
-    ),
-    Rule(
-        "lowest level",
-        "the local level of an ink is at least a share of its typical level",
-        "accuracy",
-        "extractor/image/ink_segmentation.py",
-        "min_level_share: float = 0.15",
-        "min_level_share: float = 0.0",
-    ),
-    Rule(
         "local levels",
         "the level of an ink is local",
         "accuracy",
         "extractor/native/image/ink_segmentation.cpp",
-        "std::max(total / count, limits.min_level_share * typical[ink])",
-        "typical[ink]",
+        "limits.level_share * (total / count)",
+        "limits.level_share * typical[ink]",
     ),
 )
 

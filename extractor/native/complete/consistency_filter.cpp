@@ -60,11 +60,7 @@ double misfit_ratio(Index m, double distance, double sigma, const MarkerEvidence
   const bool explained = evidence.explained[m], agreed = evidence.agreed[m],
              is_intact = evidence.is_intact[m];
   const bool confirmed = explained || agreed;
-  double allowed = limits.max_distance;
-  if (!confirmed)
-    allowed = limits.max_unexplained_distance;
-  else if (!explained)
-    allowed = limits.max_agreed_unexplained_distance;
+  const double allowed = confirmed ? limits.max_distance : limits.max_unexplained_distance;
   const double max_deviation = confirmed ? limits.max_predicted_deviation : limits.max_unexplained_distance;
   if (!(explained || is_intact || sigma < max_deviation * edge_px)) return UNBOUNDED;
   const double ratio = distance / (edge_px * allowed);
@@ -168,8 +164,7 @@ ConsistentEdges update_rejecting_inconsistent(View<double, 2> xy, View<double, 3
   for (Index m = 0; m < count; ++m) {
     const bool agreed = evidence.agreed[m];
     if (!agreed) edge_px[m] = shortest_edge(xy, m, tables.first_ring, edge_px[m]);
-    const double unexplained = agreed ? limits.max_agreed_unexplained_distance : 0.0;
-    tolerance_px[m] = edge_px[m] * (evidence.explained[m] ? limits.max_distance : unexplained);
+    tolerance_px[m] = evidence.explained[m] || agreed ? edge_px[m] * limits.max_distance : 0.0;
   }
   if (is_consistent(xy, tolerance_px, tables, size)) return {std::move(edge_px), true};
   const MarkerEvidence judged{evidence.explained, edge_px, evidence.agreed, evidence.is_intact};

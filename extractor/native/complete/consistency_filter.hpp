@@ -15,16 +15,12 @@ using ImageSize = std::array<Index, 2>;  // width and height, px
 // Limits of consistent markers; explained in extractor/complete/consistency_filter.py.
 struct ConsistencyLimits {
   std::int64_t max_rounds;
-  double max_distance, max_agreed_unexplained_distance, max_predicted_deviation, max_unexplained_distance;
+  double max_distance, max_predicted_deviation, max_unexplained_distance;
   layout::NeighbourMapLimits maps;
 
   template <class F>
   static ConsistencyLimits read(const F& f) {
-    return {f["max_rounds"],
-            f["max_distance"],
-            f["max_agreed_unexplained_distance"],
-            f["max_predicted_deviation"],
-            f["max_unexplained_distance"],
+    return {f["max_rounds"], f["max_distance"], f["max_predicted_deviation"], f["max_unexplained_distance"],
             f["maps"]};
   }
 };

@@ -64,28 +64,6 @@ double variance_by_layer(Index m, const LayerPrediction& found, double edge_px, 
   return found.variance_px2[m];
 }
 
-// The variance of the mean of the corners that a lost marker's cells imply (the article's eq. 6), px^2.
-//
-// NaN where the markers around predict another place, and at the image's border, which cuts cells. Where
-// gridlines bend sharply, the prediction by markers is hardly better.
-double variance_by_cells(Index m, const MarkerPredictions& rings, View<const double, 1> implied,
-                         double edge_px, const ImageSize& size, const RepairLimits& limits) {
-  const double x = implied[0], y = implied[1];
-  const double variance = rings.variance_px2[m], leverage = rings.leverage[m];
-  const double distance2 = square(x - rings.xy_px(m, 0)) + square(y - rings.xy_px(m, 1));
-  const double right = static_cast<double>(size[0] - 1) - x, bottom = static_cast<double>(size[1] - 1) - y;
-  const bool inside = std::min(std::min(std::min(x, y), right), bottom) > limits.border_width * edge_px;
-  const double limit2 = square(limits.max_implied_distance * edge_px);
-  if (!(inside && rings.neighbour_count[m] >= limits.min_rim_support && distance2 < limit2))
-    return NOT_A_NUMBER;
-  const double predicted_variance = variance * (1 + leverage),
-               own = square(limits.implied_deviation * edge_px);
-  if (!(leverage < limits.max_rim_leverage && predicted_variance < limit2 &&
-        distance2 < square(limits.max_implied_sigmas) * (predicted_variance + own)))
-    return NOT_A_NUMBER;
-  return 0.25 * distance2 + own;
-}
-
 // The repair of the lost markers and the fusion of the uncertain ones.
 class Repair {
  public:
@@ -112,19 +90,9 @@ class Repair {
       wanted[m] = lost_[m] || uncertain;
       if (uncertain) known_[m].fill(NOT_A_NUMBER);
     }
-    auto rings = predictions(wanted);
-    fill_by_rings(rings, wanted);
+    fill_by_rings(predictions(wanted), wanted);
     add_fused_markers();
-    if (is_any(lost_) && is_any(Flags(markers_.uncertain))) {
-      rings = predictions(lost_);
-      for_lost([&](Index m) {
-        lost_[m] = !fill(m, rings.xy_px[m], variance_by_neighbours(m, rings, edge_px_[m], limits_));
-      });
-    }
-    for_lost([&](Index m) {
-      const auto implied = markers_.implied_px[m];
-      lost_[m] = !fill(m, implied, variance_by_cells(m, rings, implied, edge_px_[m], size_, limits_));
-    });
+    if (is_any(lost_) && is_any(Flags(markers_.uncertain))) fill_lost_by_rings(predictions(lost_));
     if (is_any(lost_)) fill_by_layer();
     drop_outside();
     return std::move(status_);
@@ -142,12 +110,6 @@ class Repair {
     Array<double, 1> out({count_});
     for (Index m = 0; m < count_; ++m) out[m] = 0.5 * (cov_(m, 0, 0) + cov_(m, 1, 1));
     return out;
-  }
-
-  template <class Visit>
-  void for_lost(Visit visit) {
-    for (Index m = 0; m < count_; ++m)
-      if (lost_[m]) visit(m);
   }
 
   // writes a marker's place and isotropic covariance; false if the variance is NaN or the place not in the
@@ -171,6 +133,14 @@ class Repair {
       } else if (variance >= 0.0) {
         update_by_fusion(xy_[m], cov_[m], place, variance);
       }
+    }
+  }
+
+  // again, from uncertain markers, too
+  void fill_lost_by_rings(const MarkerPredictions& rings) {
+    for (Index m = 0; m < count_; ++m) {
+      if (lost_[m])
+        lost_[m] = !fill(m, rings.xy_px[m], variance_by_neighbours(m, rings, edge_px_[m], limits_));
     }
   }
 

@@ -14,9 +14,8 @@ namespace cmp::complete {
 
 // Limits of repaired markers; explained in extractor/complete/repair.py.
 struct RepairLimits {
-  double max_implied_distance, implied_deviation, max_implied_sigmas, border_width;
-  std::int64_t mild_support, min_rim_support;
-  double max_repaired_deviation, max_fitted_deviation, max_leverage, max_rim_leverage;
+  std::int64_t mild_support;
+  double max_repaired_deviation, max_fitted_deviation, max_leverage;
   double model_deviation, fitted_model_sigmas;
   double mild_error;
   LayerLimits layers;
@@ -24,16 +23,10 @@ struct RepairLimits {
 
   template <class F>
   static RepairLimits read(const F& f) {
-    return {f["max_implied_distance"],
-            f["implied_deviation"],
-            f["max_implied_sigmas"],
-            f["border_width"],
-            f["mild_support"],
-            f["min_rim_support"],
+    return {f["mild_support"],
             f["max_repaired_deviation"],
             f["max_fitted_deviation"],
             f["max_leverage"],
-            f["max_rim_leverage"],
             f["model_deviation"],
             f["fitted_model_sigmas"],
             f["mild_error"],
@@ -44,15 +37,14 @@ struct RepairLimits {
 
 // M markers before repair.
 struct UnrepairedMarkers {
-  View<double, 2> xy_px;             // (M, 2) NaN where lost; written
-  View<double, 3> cov_px2;           // (M, 2, 2) NaN where lost; written
-  View<const bool, 1> uncertain;     // (M,)
-  View<const double, 1> edge_px;     // (M,) edge at each marker
-  View<const double, 2> implied_px;  // (M, 2) the places before refinement, which the cells imply
+  View<double, 2> xy_px;          // (M, 2) NaN where lost; written
+  View<double, 3> cov_px2;        // (M, 2, 2) NaN where lost; written
+  View<const bool, 1> uncertain;  // (M,)
+  View<const double, 1> edge_px;  // (M,) edge at each marker
 
   template <class F>
   static UnrepairedMarkers read(const F& f) {
-    return {f["xy_px"], f["cov_px2"], f["uncertain"], f["edge_px"], f["implied_px"]};
+    return {f["xy_px"], f["cov_px2"], f["uncertain"], f["edge_px"]};
   }
 };
 

@@ -88,17 +88,6 @@ struct Strip {
 // The difference of two angles, unwrapped to the nearer side.
 double unwrapped_deg(double difference) { return difference - 360.0 * std::floor(difference / 360.0 + 0.5); }
 
-// The least chroma that only a share of the colored pixels exceeds, by the counts of each chroma.
-Index strong_chroma(const std::array<std::int64_t, VALUES>& counts, double share) {
-  std::int64_t total = 0, below = 0;
-  for (std::int64_t count : counts) total += count;
-  const double limit = share * static_cast<double>(total);
-  Index strong = 0;
-  while (strong < VALUES - 1 && static_cast<double>(below + counts[strong]) < limit)
-    below += counts[strong++];
-  return strong;
-}
-
 }  // namespace
 
 HueImages hsv_and_chroma(View<const std::uint8_t, 3> image) {
@@ -123,32 +112,19 @@ HueImages hsv_and_chroma(View<const std::uint8_t, 3> image) {
 
 Array<double, 1> hue_weights(View<const std::uint8_t, 2> hue, View<const std::uint8_t, 2> chroma,
                              const HueLimits& limits) {
-  const Index low_levels = VALUES / limits.pale_divisor, min_chroma = limits.min_chroma;
-  std::array<std::int64_t, VALUES> chroma_counts{}, weights{};
-  Array<std::int32_t, 1> low_counts({low_levels * VALUES}, 0);  // pixels that may be pale, by chroma and hue
-  const auto low = low_counts.view();
+  const Index min_chroma = limits.min_chroma;
+  std::array<std::int64_t, VALUES> weights{};
   const auto height = hue.size(0), width = hue.size(1);
   for (Index y = 0; y < height; ++y) {
     const auto hues = hue[y], levels = chroma[y];
     for (Index x = 0; x < width; ++x) {
-      const Index level = levels[x], hue_of_pixel = hues[x];
-      if (level < min_chroma) continue;
-      ++chroma_counts[level];
-      if (level < low_levels)
-        ++low[level * VALUES + hue_of_pixel];
-      else
-        weights[hue_of_pixel] += level;
+      const Index level = levels[x];
+      if (level >= min_chroma) weights[hues[x]] += level;
     }
   }
-  const Index strong = strong_chroma(chroma_counts, limits.strong_quantile);
   Array<double, 1> out({HUES});
   const auto totals = out.view();
   for (Index one = 0; one < HUES; ++one) totals[one] = static_cast<double>(weights[one]);
-  for (Index level = std::max(min_chroma, strong / limits.pale_divisor); level < low_levels; ++level) {
-    const auto counts = low.slice(level * VALUES, (level + 1) * VALUES);
-    const auto chroma_of_each = static_cast<double>(level);
-    for (Index one = 0; one < HUES; ++one) totals[one] += chroma_of_each * counts[one];
-  }
   return out;
 }
 

@@ -18,14 +18,11 @@ struct HueLimits {
   double width_deg;
   std::int64_t rounds;
   std::int64_t min_chroma;
-  double strong_quantile;
-  std::int64_t pale_divisor;
   double ink_width_deg;
 
   template <class F>
   static HueLimits read(const F& f) {
-    return {f["reach_deg"],       f["width_deg"],    f["rounds"],       f["min_chroma"],
-            f["strong_quantile"], f["pale_divisor"], f["ink_width_deg"]};
+    return {f["reach_deg"], f["width_deg"], f["rounds"], f["min_chroma"], f["ink_width_deg"]};
   }
 };
 
@@ -38,7 +35,7 @@ using HueShifts = std::tuple<Array<double, 1>, bool>;
 // image (H, W, 3) BGR without gaps.
 HueImages hsv_and_chroma(View<const std::uint8_t, 3> image);
 
-// (180,) the sum of the chroma of all pixels of each hue that are not pale; hue, chroma (H, W).
+// (180,) the sum of the chroma of all colored pixels of each hue; hue, chroma (H, W).
 Array<double, 1> hue_weights(View<const std::uint8_t, 2> hue, View<const std::uint8_t, 2> chroma,
                              const HueLimits& limits);
 

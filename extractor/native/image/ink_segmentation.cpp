@@ -149,8 +149,7 @@ TileThresholds tile_thresholds(View<const float, 3> level, const LabelLimits& li
           total += dilated_levels(y, x);
           count += 1.0;
         });
-        const double local =
-            limits.level_share * std::max(total / count, limits.min_level_share * typical[ink]);
+        const double local = limits.level_share * (total / count);
         threshold(ink, row, column) = static_cast<std::uint8_t>(
             std::min(std::max(local, static_cast<double>(limits.min_chroma)), 255.0));
       }

@@ -10,12 +10,11 @@ namespace cmp::image {
 // The limits of the labels of pixels; the Python module explains them.
 struct LabelLimits {
   double level_share;
-  double min_level_share;
   std::int64_t min_chroma;
 
   template <class F>
   static LabelLimits read(const F& f) {
-    return {f["level_share"], f["min_level_share"], f["min_chroma"]};
+    return {f["level_share"], f["min_chroma"]};
   }
 };
 

@@ -26,9 +26,6 @@ constexpr double ONE_STEP = 1.0;  // of a channel, the least that the strongest 
 constexpr int FIRST_INK = 1, INKS = 4;
 // The corners of a down-cell relative to its center, in axial steps: below, upper right and upper left.
 constexpr std::array<PlanePoint, 3> CORNERS{{{1.0 / 3, -2.0 / 3}, {1.0 / 3, 1.0 / 3}, {-2.0 / 3, 1.0 / 3}}};
-constexpr std::array<int, 3> OPPOSITE_INKS{2, 3, 1};  // of the cells opposite to the corners
-
-double dot(const Color& a, const Color& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 Color color_of(View<const double, 1> values) { return {values[0], values[1], values[2]}; }
 
@@ -41,8 +38,6 @@ class WhitePlace {
         height_(image.size(0)),
         width_(image.size(1)),
         map_(map),
-        inks_(inks),
-        black_(color_of(black)),
         limits_(limits),
         radius_(limits.sample_radius * std::sqrt(std::abs(map.qx * map.ry - map.rx * map.qy))) {
     for (int channel = 0; channel < 3; ++channel) {
@@ -50,21 +45,21 @@ class WhitePlace {
       for (int c = FIRST_INK; c < INKS; ++c) most = std::max(most, inks(c, channel));
       strongest_[channel] = std::max(most, ONE_STEP);
     }
-    ground_ = whiteness(black_);
+    ground_ = whiteness(color_of(black));
     for (int c = FIRST_INK; c < INKS; ++c) ground_ = std::max(ground_, whiteness(color_of(inks[c])));
   }
 
   // The center of the white cell; NaN if it is not at its predicted center.
   PlanePoint verified_center() {
     const PlanePoint predicted = map_.center;
-    if (is_white_cell()) return predicted;
+    if (is_white_triangle()) return predicted;
     // the centroid is more accurate than the map, unless something white is next to the cell
     const PlanePoint step = white_centroid();
     const double square = step.x * step.x + step.x * step.y + step.y * step.y;
     if (!(square <= limits_.max_centroid_distance * limits_.max_centroid_distance)) return {NOWHERE, NOWHERE};
     map_.center = {predicted.x + (map_.qx * step.x + map_.rx * step.y),
                    predicted.y + (map_.qy * step.x + map_.ry * step.y)};
-    if (is_white_cell()) return map_.center;
+    if (is_white_triangle()) return map_.center;
     return {NOWHERE, NOWHERE};
   }
 
@@ -83,8 +78,6 @@ class WhitePlace {
       return std::nullopt;
     return own;
   }
-
-  bool is_white_cell() const { return is_white_triangle() && is_between_inks(); }
 
   // The axial vector to the centroid of the whiteness above the ground; NaN where nothing is whiter.
   PlanePoint white_centroid() const {
@@ -131,29 +124,9 @@ class WhitePlace {
     return true;
   }
 
-  // Whether the three adjacent cells show their inks, or black where a cell is missing.
-  bool is_between_inks() const {
-    for (std::size_t k = 0; k < CORNERS.size(); ++k) {
-      auto own = mean_color(-CORNERS[k].x, -CORNERS[k].y);
-      if (!own) continue;
-      Color ink = color_of(inks_[OPPOSITE_INKS[k]]);
-      for (int channel = 0; channel < 3; ++channel) {
-        ink[channel] -= black_[channel];
-        (*own)[channel] -= black_[channel];
-      }
-      const double strength = dot(ink, ink), size = std::sqrt(dot(*own, *own));
-      if (size > limits_.min_ink_strength * std::sqrt(strength) &&
-          dot(*own, ink) < limits_.min_ink_cosine * size * std::sqrt(strength))
-        return false;
-    }
-    return true;
-  }
-
   View<const std::uint8_t, 1> flat_;
   Index height_, width_;
   AxialMap map_;
-  View<const double, 2> inks_;
-  Color black_;
   const WhiteCellLimits& limits_;
   double radius_;  // of a color sample, px
   Color strongest_;

@@ -1,5 +1,4 @@
-// Decides whether a bright place is the white cell: white inside, not white outside, and between the right
-// inks.
+// Decides whether a bright place is the white cell: white inside and not white outside.
 #pragma once
 
 #include "base/array.hpp"
@@ -23,16 +22,24 @@ struct WhiteCellPoints {
 struct WhiteCellLimits {
   Index max_fit_cells, min_fit_cells;
   double ridge, weight_softening, min_pivot_share, max_predicted_deviation, max_centroid_distance;
-  double min_inside, min_corner, max_outside, min_reach, min_ink_cosine, min_ink_strength, sample_radius;
+  double min_inside, min_corner, max_outside, min_reach, sample_radius;
   WhiteCellPoints points;
 
   template <class F>
   static WhiteCellLimits read(const F& f) {
-    return {f["max_fit_cells"],         f["min_fit_cells"],   f["ridge"],
-            f["weight_softening"],      f["min_pivot_share"], f["max_predicted_deviation"],
-            f["max_centroid_distance"], f["min_inside"],      f["min_corner"],
-            f["max_outside"],           f["min_reach"],       f["min_ink_cosine"],
-            f["min_ink_strength"],      f["sample_radius"],   f["points"]};
+    return {f["max_fit_cells"],
+            f["min_fit_cells"],
+            f["ridge"],
+            f["weight_softening"],
+            f["min_pivot_share"],
+            f["max_predicted_deviation"],
+            f["max_centroid_distance"],
+            f["min_inside"],
+            f["min_corner"],
+            f["max_outside"],
+            f["min_reach"],
+            f["sample_radius"],
+            f["points"]};
   }
 };
 

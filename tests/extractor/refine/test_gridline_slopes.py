@@ -111,7 +111,7 @@ def test_noise_moves_the_outermost_layers_as_the_covariances_say(pattern: str, w
     )
     response = np.linalg.inv(curved)
     variance = np.diag(response @ straight @ response.T).reshape(count, 2).sum(axis=1)
-    own = strength[:, None] * topology.end_couplings[:, 3 * way : 3 * way + 3] * [1 / 3, 1 / 3, 1 / 6]
+    own = strength[:, None] * topology.covariance_couplings[:, 3 * way : 3 * way + 3] * [1 / 3, 1 / 3, 1 / 6]
     square = np.stack([across[:, 0] ** 2, across.prod(axis=1), across[:, 1] ** 2], axis=1)
     diagonal = np.zeros((count, 3))
     for at in (0, 1):

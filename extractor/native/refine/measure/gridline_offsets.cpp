@@ -31,16 +31,6 @@ struct StationTotal {
   double residual, information;
 };
 
-// Whether the gridlines at both ends of gridline e keep clear of one of its stations.
-bool is_clear(const GridlineReading& reading, Index e, Index station, Index count,
-              const OffsetLimits& limits) {
-  const auto own = static_cast<double>(station), all = static_cast<double>(count);
-  const double from_start = (own + 0.5) / (all + 1.0), from_end = (all - own - 0.5) / (all + 1.0);
-  const double start = from_start * reading.clearance(e, SINE_A),
-               end = from_end * reading.clearance(e, SINE_B);
-  return !(reading.lines(e, LENGTH) * std::min(start, end) < limits.clear_sigma * reading.sigma);
-}
-
 // The gridlines that are measured, and what they are compared with.
 struct Comparison {
   ComparedImages images;
@@ -141,8 +131,7 @@ Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const flo
     fill_station_sums(compared, e, *buffers, sums);
     for (Index j = 0; j < count; ++j) {
       const auto [residual, information] = sums[static_cast<std::size_t>(j)];
-      const bool clear = reading.drawn || is_clear(reading, e, j, count, limits);
-      if (information < limits.min_weight_sum * strength || !clear) continue;
+      if (information < limits.min_weight_sum * strength) continue;
       const double variance = reading.variance_ratio[e] * (reading.noise * reading.noise);
       out(e, j, OFFSET) = reading.sigma * residual / information - reading.dot_gain_offset[e];
       out(e, j, VARIANCE) = variance * (reading.sigma * reading.sigma) / information;
