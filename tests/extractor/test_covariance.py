@@ -121,6 +121,22 @@ def test_virtual_markers_between_rounded_cells_lie_on_the_gridlines(preset: str)
     assert 0.6 < summarise(d2).z.value < 1.1
 
 
+def test_the_covariance_of_the_outermost_layer_holds_halos() -> None:
+    """Tone mapping changes the light beside the pattern. With the ratio of all gridlines, every fifth was beyond."""
+    d2 = []
+    for case in camera_cases(False, 11):
+        if case.kind == "tone mapping" and len(d2) < 4:
+            seen = case.shoot()
+            markers = Extractor(parse_layout(layout_to_json(case.layout)), side="either").extract(seen.image)
+            outermost = case.layout.marker_layer == case.layout.marker_layer.max()
+            mine = (markers.status == Status.MEASURED) & outermost
+            error = markers.xy_px - seen.truths[0].marker_xy_px
+            d2.append(squared_distances(error[mine], markers.cov_px2[mine]))
+    found = summarise(d2)
+    assert found.pictures == 4 and found.count > 200
+    assert 0.8 < found.z.value < 1.7 and found.beyond.value < 0.15
+
+
 @pytest.mark.parametrize("preset", ["balanced", "accurate"])
 def test_the_covariance_holds_what_a_camera_does_to_gridlines(preset: str) -> None:
     """Colors beside each other, aberration, motion, demosaicing, compression: the gridlines at a marker disagree."""

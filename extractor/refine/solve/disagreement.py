@@ -2,8 +2,10 @@
 
 A marker has two unknowns and up to six gridlines. Where noise alone moves gridlines, the squared distances between each
 gridline's own place and its place by the solved markers add up to the degrees of freedom. Halos, clipping,
-displaced ink edges, dirt and compression increase these distances. The ratio, of the picture and of the
-gridlines around each marker, multiplies the variance of the noise (the Birge ratio; Birge, Phys. Rev. 40, 207, 1932).
+displaced ink edges, dirt and compression increase these distances. The ratio multiplies the variance of the noise (the
+Birge ratio; Birge, Phys. Rev. 40, 207, 1932). It is estimated at three levels, each of which counts as some more
+degrees of freedom at the next one: the picture; the gridlines inside, and those that end at the rim, which have other
+neighbours than cells; the gridlines around each gridline.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ class DisagreementLimits(NamedTuple):
     Attributes:
         tail_freedom: degrees of freedom of the t distribution by which gridlines count for their picture. Chosen;
             `python -m benchmarks.calibration` judges it.
-        picture_freedom: degrees of freedom by which the picture's ratio counts beside that of the gridlines around.
-            Chosen; `python -m benchmarks.calibration` judges it.
+        picture_freedom: degrees of freedom by which the ratio of one level counts beside that of the next one. Chosen;
+            `python -m benchmarks.calibration` judges it.
         rounds: of the picture's ratio. Chosen.
         min_freedom: degrees of freedom of a gridline, at least. Derived: it only keeps a division from failing.
         max_square: of a distance over its deviation, at most. Derived: it only keeps a division from failing.

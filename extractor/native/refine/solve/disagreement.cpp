@@ -113,6 +113,12 @@ PictureRatio ratio_of_picture(View<const double, 1> square, View<const double, 1
   return found;
 }
 
+// Whether gridline e ends at a marker with fewer gridlines than inside the pattern.
+bool ends_at_rim(const GridlineSystem& system, Index e) {
+  const Index last = system.spokes.size(1) - 1;
+  return system.spokes(system.edges(e, 0), last) < 0 || system.spokes(system.edges(e, 1), last) < 0;
+}
+
 }  // namespace
 
 Array<double, 1> variance_ratios(const GridlineSystem& system, const ShiftGradients& gradients,
@@ -123,17 +129,24 @@ Array<double, 1> variance_ratios(const GridlineSystem& system, const ShiftGradie
   const PictureRatio picture = ratio_of_picture(squares, freedoms, limits);
   const auto square = squares.view(), freedom = freedoms.view(), count = picture.count.view();
   Array<double, 1> at_square({system.spokes.size()}, 0.0), at_freedom({system.spokes.size()}, 0.0);
+  std::array<double, 2> side_square{},
+      side_freedom{};  // of the gridlines inside, and of those that end at the rim
   for (Index e = 0; e < edges.size(); ++e) {
-    for (Index side = 0; side < 2; ++side) {
-      at_square[edges(e, side)] += count[e] * square[e];
-      at_freedom[edges(e, side)] += freedom[e];
+    const Index side = ends_at_rim(system, e) ? 1 : 0;
+    side_square[side] += count[e] * square[e];
+    side_freedom[side] += freedom[e];
+    for (Index end = 0; end < 2; ++end) {
+      at_square[edges(e, end)] += count[e] * square[e];
+      at_freedom[edges(e, end)] += freedom[e];
     }
   }
   Array<double, 1> out({edges.size()});
   for (Index e = 0; e < edges.size(); ++e) {
-    const Index a = edges(e, 0), b = edges(e, 1);
+    const Index a = edges(e, 0), b = edges(e, 1), side = ends_at_rim(system, e) ? 1 : 0;
+    const double around = (limits.picture_freedom * picture.ratio + side_square[side]) /
+                          (limits.picture_freedom + side_freedom[side]);
     const double own_square =
-        limits.picture_freedom * picture.ratio + at_square[a] + at_square[b] - count[e] * square[e];
+        limits.picture_freedom * around + at_square[a] + at_square[b] - count[e] * square[e];
     const double own_freedom = limits.picture_freedom + at_freedom[a] + at_freedom[b] - freedom[e];
     out[e] = std::max(own_square / own_freedom, limits.min_ratio);
   }
