@@ -19,8 +19,7 @@ from extractor.localmap.cell_prediction import LIMITS as PREDICTION_LIMITS
 from extractor.localmap.cell_prediction import CellPredictionLimits, lattice_bases
 from extractor.numbering.white_cell import LIMITS as WHITE_CELL_LIMITS
 from extractor.numbering.white_cell import WhiteCellLayout, WhiteCellLimits
-from extractor.numbering.whiteness import LIMITS as WHITENESS_LIMITS
-from extractor.numbering.whiteness import WhitenessLimits, measure_inks
+from extractor.numbering.whiteness import measure_inks
 
 
 class WhiteSearchLimits(NamedTuple):
@@ -39,7 +38,7 @@ class WhiteSearchLimits(NamedTuple):
         max_white_candidates: places tried in a ring, the brightest. Chosen.
         min_weakest_channel: least whiteness. Chosen.
         min_weakest_channel_far: the same where no walked cell touches the place. Chosen.
-        cell, whiteness, prediction: of the modules that do these steps.
+        cell, prediction: of the modules that do these steps.
     """
 
     min_white_ratio: float = 0.75
@@ -50,7 +49,6 @@ class WhiteSearchLimits(NamedTuple):
     min_weakest_channel: float = 0.5
     min_weakest_channel_far: float = 0.75
     cell: WhiteCellLimits = WHITE_CELL_LIMITS
-    whiteness: WhitenessLimits = WHITENESS_LIMITS
     prediction: CellPredictionLimits = PREDICTION_LIMITS
 
 

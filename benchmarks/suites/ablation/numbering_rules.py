@@ -85,14 +85,6 @@ NUMBERING = (
         "max_centroid_distance: float = 0.3",
         "max_centroid_distance: float = 0.0",
     ),
-    Rule(
-        "channel balance",
-        "a place with a weak channel is colored, not white",
-        "no wrong id",
-        "extractor/numbering/whiteness.py",
-        "min_channel_balance: float = 0.4",
-        "min_channel_balance: float = 0.0",
-    ),
 )
 
 GAPS = (

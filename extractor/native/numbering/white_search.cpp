@@ -137,7 +137,7 @@ WhiteCandidates search_white_cell(View<const std::uint8_t, 3> image, View<const 
     if (ring == 1)
       localmap::update_excluded_misfits(grid, axial, known.cells, layout.layers, limits.prediction);
     const auto places = localmap::predicted_places(center, known, grid, ring, limits.prediction);
-    const auto shown = measure_whiteness(image, places.means, inks.strongest, is_far, limits.whiteness);
+    const auto shown = measure_whiteness(image, places.means, inks.strongest, is_far);
     if (!is_far) {
       if (!is_dark_between_inks(shown.brightness, places.support_count, limits)) break;
       black = black_color(shown.color, places.support_count);

@@ -16,7 +16,6 @@ struct WhiteSearchLimits {
   Index min_enclosed_places, max_white_candidates;
   double min_weakest_channel, min_weakest_channel_far;
   WhiteCellLimits cell;
-  WhitenessLimits whiteness;
   localmap::CellPredictionLimits prediction;
 
   template <class F>
@@ -29,7 +28,6 @@ struct WhiteSearchLimits {
             f["min_weakest_channel"],
             f["min_weakest_channel_far"],
             f["cell"],
-            f["whiteness"],
             f["prediction"]};
   }
 };
