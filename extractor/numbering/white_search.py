@@ -29,12 +29,6 @@ class WhiteSearchLimits(NamedTuple):
 
     Attributes:
         min_white_ratio: brightness of white; blurred black stays below 0.5, dim white is brighter than any ink. Chosen.
-        max_black_ratio: brightness between the inks: black is darker than the inks even in haze, other images are not.
-            Measured: rule "dark between inks".
-        min_black_share: of the places between three cells; the white cell and glare are among these places. Measured:
-            rule "dark between inks".
-        min_enclosed_places: such places; if fewer, places next to one or two cells count, too. Measured: rule "dark
-            between inks".
         max_white_candidates: places tried in a ring, the brightest. Chosen.
         min_weakest_channel: least whiteness. Chosen.
         min_weakest_channel_far: the same where no walked cell touches the place. Chosen.
@@ -42,9 +36,6 @@ class WhiteSearchLimits(NamedTuple):
     """
 
     min_white_ratio: float = 0.75
-    max_black_ratio: float = 0.95
-    min_black_share: float = 0.8
-    min_enclosed_places: int = 6
     max_white_candidates: int = 16
     min_weakest_channel: float = 0.5
     min_weakest_channel_far: float = 0.75

@@ -62,14 +62,6 @@ NUMBERING = (
         "ring < 1",
     ),
     Rule(
-        "dark between inks",
-        "between the inks the pattern is black",
-        "no wrong id",
-        "extractor/numbering/white_search.py",
-        "min_black_share: float = 0.8",
-        "min_black_share: float = 0.0",
-    ),
-    Rule(
         "white triangle",
         "the white cell fills its triangle and ends with it",
         "no wrong id",
