@@ -125,8 +125,16 @@ GAPS = (
         "large blocks of cells are not joined by contacts that no third cell confirms",
         "no wrong id",
         "extractor/native/numbering/gaps/gap_check.cpp",
-        "blocks_of(neighbours, selected, limits)",
+        "blocks_of(contacts, cell, neighbours, selected, limits)",
         "connected_components(neighbours, selected)",
+    ),
+    Rule(
+        "even contacts",
+        "nor by contacts that lie farther off than the cells around predict",
+        "no wrong id",
+        "extractor/numbering/gaps/gap_check.py",
+        "max_contact_jump: float = 0.5",
+        "max_contact_jump: float = 100.0",
     ),
     Rule(
         "single cells",
