@@ -92,7 +92,7 @@ class ReadImage(NamedTuple):
 
     Attributes:
         markers: the markers.
-        appearance: blur, noise and levels of the image; None where the pattern was not drawn.
+        appearance: blur, noise and levels of the image; None where no pattern was found.
     """
 
     markers: Markers

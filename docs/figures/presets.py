@@ -5,7 +5,6 @@ from __future__ import annotations
 from extractor.presets import SCHEDULES
 
 BEGIN, END = "<!-- presets: written by python -m docs.figures -->", "<!-- end of presets -->"
-NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 
 def filled(text: str) -> str:
@@ -24,17 +23,11 @@ def filled(text: str) -> str:
 def table() -> str:
     """One row a preset."""
     rows = [
-        "| preset | profiles | image reduced to a blur of | synthesis | no step follows a move below |",
-        "|---|---|---|---|---|",
+        "| preset | rows across a gridline | image reduced to a blur of | no step follows one that leaves |",
+        "|---|---|---|---|",
     ]
     for preset, schedule in SCHEDULES.items():
         name = f"`{preset}` (default)" if preset == "balanced" else f"`{preset}`"
-        most = f"at most {NUMBERS[schedule.steps]} steps"
-        profiles = "one round"
-        if schedule.sharp_blur_share:
-            profiles = "two rounds"
-            limit = f"where the blur is above {schedule.sharp_blur_share:g} edges"
-            most = f"none; {most} in the place of the second round {limit}"
-        move = f"{schedule.small_move:g} standard deviations"
-        rows.append(f"| {name} | {profiles} | {schedule.reduction_blur_px:g} px | {most} | {move} |")
+        left = f"{schedule.small_remainder:g} standard deviations"
+        rows.append(f"| {name} | {schedule.max_profile_rows} | {schedule.reduction_blur_px:g} px | {left} |")
     return "\n".join(rows)

@@ -36,11 +36,11 @@ MEASURED = np.uint8(Status.MEASURED)
 class RepairLimits(NamedTuple):
     """Limits of repaired markers. Distances and deviations are in edges, unless stated otherwise.
 
-    Errors of repaired markers against the residual of the fit to their neighbours are from 300 rendered scenes with
-    missing cells and dirt on flat, tilted, pressed and twisted patterns: deviation = ``mild_error`` * leverage *
-    residual, as the surface departs the more from the map the farther this extrapolates. A layer's quadratic rests on
-    few markers and may seem to fit better than it does: its variance counts ``heavy_error`` times, and is never below
-    that of the model.
+    The variance of a repaired marker has two parts. The stated errors of its neighbours are independent: each counts by
+    the squared weight of the neighbour. The rest of the neighbours' residual variance is a departure of the surface
+    from the map: its deviation counts ``mild_error`` * leverage times, as the surface departs the more from the map the
+    farther this extrapolates. The factor is from 300 rendered scenes with missing cells and dirt on flat, tilted,
+    pressed and twisted patterns. The variance of a fitted marker has the same two parts (``layer_arcs``).
 
     Attributes:
         mild_support: known neighbours of two rings that make an omission mild. Chosen.
@@ -51,9 +51,8 @@ class RepairLimits(NamedTuple):
         model_deviation: deviation of a smooth surface from a quadratic map. Chosen.
         fitted_model_sigmas: such deviations that are added to a layer's residual before it is compared with
             ``max_fitted_deviation``. Chosen.
-        mild_error: times leverage and residual. Measured as described above, by no command that is kept;
+        mild_error: times leverage, of the departure. Measured as described above, by no command that is kept;
             `python -m benchmarks.calibration` prints z of repaired markers.
-        heavy_error: the same of a layer's quadratic, as a factor of the variance. Measured likewise.
         layers: limits of a layer's quadratic.
         maps: limits of the predictions by neighbours.
     """
@@ -65,7 +64,6 @@ class RepairLimits(NamedTuple):
     model_deviation: float = 0.012
     fitted_model_sigmas: float = 3.0
     mild_error: float = 1.6
-    heavy_error: float = 2.0
     layers: LayerLimits = LAYER_LIMITS
     maps: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS
 

@@ -7,7 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.layout.gridline_slopes import end_couplings, scatter_bending, slope_weights
+from extractor.layout.gridline_slopes import (
+    LayoutGridlines,
+    covariance_couplings,
+    end_couplings,
+    scatter_bending,
+    slope_weights,
+)
 from extractor.layout.reference import BLACK, Reference
 
 MAX_NEIGHBOURS = 6  # of a marker
@@ -45,6 +51,7 @@ class Topology(NamedTuple):
             ``ring_vectors``.
         next_edges: (M, 6) int32, the edge that follows each of the ``spokes`` on the same gridline.
         end_couplings: (E, 6) float64, see ``gridline_slopes``.
+        covariance_couplings: (E, 6) float64, the same of the covariances.
         scatter_bending: (E, 3) float64, see ``gridline_slopes``.
     """
 
@@ -63,6 +70,7 @@ class Topology(NamedTuple):
     third_differences: NDArray[np.float64]
     next_edges: NDArray[np.int32]
     end_couplings: NDArray[np.float64]
+    covariance_couplings: NDArray[np.float64]
     scatter_bending: NDArray[np.float64]
 
 
@@ -91,6 +99,10 @@ def topology_of(layout: Reference) -> Topology:
     stencil = _derivative_stencil(ring_markers, ring_vectors)
     edge_vectors = chord / length.mean()
     slopes = slope_weights(stencil, ring_markers, edges, edge_vectors)
+    couplings = end_couplings(slopes, edges)
+    is_inner: NDArray[np.bool_] = np.all(ring_markers >= 0, axis=1)
+    is_seen: NDArray[np.bool_] = np.any(edge_cells >= 0, axis=1)
+    gridlines = LayoutGridlines(edges, edge_vectors, is_seen, spokes, is_inner)
     return Topology(
         edges=layout.edges.astype(np.int32),
         cells=cells.astype(np.int32),
@@ -106,7 +118,8 @@ def topology_of(layout: Reference) -> Topology:
         next_markers=next_markers,
         third_differences=np.where(np.all(next_markers >= 0, axis=1)[:, None], third / length.mean(), 0.0),
         next_edges=_next_edges(spokes, edges, next_markers, key),
-        end_couplings=end_couplings(slopes, edges),
+        end_couplings=couplings,
+        covariance_couplings=covariance_couplings(couplings, slopes, gridlines),
         scatter_bending=scatter_bending(slopes, edges, edge_vectors, spokes),
     )
 

@@ -159,16 +159,3 @@ def update_lost_markers(
     return np.asarray(
         native.update_lost_markers(xy, cov, unaccepted, predicted, start, edge, HIDDEN_MARKER_LIMITS)
     )
-
-
-def update_obstructed_markers(
-    xy: NDArray[np.float64], cov: NDArray[np.float64], selected: NDArray[np.bool_], places: StartPlaces
-) -> None:
-    """Put covered markers between the places by profiles and by triangles; NaN where these differ much.
-
-    Args:
-        xy, cov: (M, 2) px and (M, 2, 2) px^2 by profiles, written.
-        selected: (M,) bool, the covered markers.
-        places: by triangles.
-    """
-    native.update_obstructed_markers(xy, cov, selected, places, HIDDEN_MARKER_LIMITS)

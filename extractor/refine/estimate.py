@@ -66,7 +66,7 @@ class RefinedMarkers:
             (and after synthesis, its place is from profiles alone).
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, gray levels, one channel.
-        appearance: appearance of the image; None where the pattern was not drawn.
+        appearance: appearance of the image.
         points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not
             measured.
         scatter: of the markers, each by itself.
@@ -77,7 +77,7 @@ class RefinedMarkers:
     explained: NDArray[np.bool_]
     blur_px: float
     noise: float
-    appearance: Appearance | None
+    appearance: Appearance
     points: NDArray[np.float64]
     scatter: MarkerScatter
 
@@ -120,11 +120,11 @@ class Estimate(NamedTuple):
         roughness: (M,) px^2, roughness of the markers around each marker.
         bend_variance: (E,) px^2, variance of the gridlines' bending beyond the map.
         bend: (E, 2) px, the bending.
-        reading: gridlines and levels that the last step compared with the image; None before the first step.
+        weight: (E,) 0 to 1, of the gridlines in the last step; 1 before the first.
+        reading: gridlines and levels that the last step by synthesis compared with the image; None before the first.
         dot_gain: distance by which the sides of all cells have moved outward, px.
         scatter: of the markers, each by itself.
-        convergence_cov_px2: (M, 2, 2) covariance of the remaining error after the last step; None where no pattern is
-            drawn.
+        convergence_cov_px2: (M, 2, 2) covariance of the remaining error after the last step; None before it.
     """
 
     xy: NDArray[np.float64]
@@ -140,16 +140,16 @@ class Estimate(NamedTuple):
     roughness: NDArray[np.float64]
     bend_variance: NDArray[np.float64]
     bend: NDArray[np.float64]
-    reading: GridlineReading | None
+    weight: NDArray[np.float64]
+    reading: GridlineReading | None = None
     dot_gain: float = 0.0
     scatter: MarkerScatter = NO_SCATTER
     convergence_cov_px2: NDArray[np.float64] | None = None
 
     def pattern_state(self) -> PatternState:
-        """The part for compiled functions; all weights are 1 before the first step."""
-        weight = np.ones(len(self.bend)) if self.reading is None else self.reading.weight
+        """The part for compiled functions."""
         where = self.xy, self.hidden, self.maps, self.roughness, self.bend
-        return PatternState(*where, weight, self.sigma, self.noise, self.dot_gain, self.scatter)
+        return PatternState(*where, self.weight, self.sigma, self.noise, self.dot_gain, self.scatter)
 
 
 class EdgeContrasts(NamedTuple):

@@ -75,8 +75,7 @@ def correct_outliers(
         profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         places: of the full image.
     """
-    assert estimate.reading is not None
-    suspect = native.suspect_markers(profile_weight, estimate.reading.weight, topology.spokes, LIMITS)
+    suspect = native.suspect_markers(profile_weight, estimate.weight, topology.spokes, LIMITS)
     if not suspect.any():
         return estimate, places
     start = start_places(places)
@@ -87,30 +86,3 @@ def correct_outliers(
         return estimate, places
     estimate = estimate._replace(measured=measured, reliable=reliable)
     return estimate, replace(places, xy_px=xy, agreed=agreed, is_intact=is_intact)
-
-
-def find_outliers(
-    topology: Topology,
-    estimate: Estimate,
-    xy: NDArray[np.float64],
-    profile_weight: NDArray[np.float64],
-    edge_px: NDArray[np.float64],
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Outliers and suspect markers.
-
-    Args:
-        topology: of the layout.
-        estimate: after a round of profiles.
-        xy: (M, 2) px, NaN where unknown.
-        profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
-        edge_px: (M,) the length of the edges at each marker.
-
-    Returns:
-        (M,) bool, the outliers, and (M,) bool, the markers whose gridlines look unlike the pattern. Without any of the
-        latter there are no outliers.
-    """
-    assert estimate.reading is not None
-    suspect = native.suspect_markers(profile_weight, estimate.reading.weight, topology.spokes, LIMITS)
-    if not suspect.any():
-        return suspect, suspect
-    return native.outlier_markers(xy, estimate.maps, suspect, edge_px, topology, LIMITS), suspect

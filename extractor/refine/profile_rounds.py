@@ -11,7 +11,6 @@ from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.refine.estimate import EdgeContrasts, Estimate
-from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.measure.matched_filter import LIMITS as ROW_LIMITS
 from extractor.refine.measure.matched_filter import MatchedFilterLimits
 from extractor.refine.outliers import LIMITS as OUTLIER_LIMITS
@@ -61,19 +60,13 @@ class ProfileStep(NamedTuple):
     Attributes:
         profile_weight: (E,) 0 to 1, similarity of each gridline to the pattern.
         weight: (E,) 0 to 1, with which it was used.
-        variance_ratio: (E,), as ``variance_ratios`` gives it; 1 before the last round.
-        bend_variance: (E,) px^2.
         dot_gain: px.
-        dot_gain_offset: (E,) px, offset of each gridline by the dot gain.
         solution: the markers after the step.
     """
 
     profile_weight: NDArray[np.float64]
     weight: NDArray[np.float64]
-    variance_ratio: NDArray[np.float64]
-    bend_variance: NDArray[np.float64]
     dot_gain: float
-    dot_gain_offset: NDArray[np.float64]
     solution: StepSolution
 
 
@@ -84,10 +77,11 @@ def profile_step(
     lines: NDArray[np.float64],
     contrasts: EdgeContrasts,
     stations: int,
-    *,
-    judged: bool,
 ) -> tuple[Estimate, NDArray[np.float64]]:
     """A round of profiles.
+
+    The best gridlines look wrong while their markers are a pixel off. So the weights by their looks are used only
+    around markers with few other measurements.
 
     Args:
         view: the image.
@@ -96,18 +90,12 @@ def profile_step(
         lines: (E, 8) its gridlines.
         contrasts: across them.
         stations: rows of pixels across each gridline at most.
-        judged: weight gridlines by their similarity to the pattern, as in the last round, in which they are already
-            close. In earlier rounds the best gridlines look wrong, and the weights are used only around markers with
-            few other measurements.
 
     Returns:
         The estimate after the round, and (E,) 0 to 1, similarity of gridlines to the pattern.
     """
     state = estimate.pattern_state()
-    found = native.profile_step(view, lines, contrasts, state, topology, stations, judged, LIMITS)
+    found = native.profile_step(view, lines, contrasts, state, topology, stations, LIMITS)
     step = ProfileStep(*(*found[:-1], step_solution(*found[-1])))
-    weights = step.weight, step.variance_ratio, step.dot_gain_offset
-    look = contrasts.sides, contrasts.sides, contrasts.clearance, *weights
-    reading = GridlineReading(lines, *look, estimate.sigma, estimate.noise, False)
-    others = {"bend_variance": step.bend_variance, "dot_gain": step.dot_gain, "reading": reading}
+    others = {"weight": step.weight, "dot_gain": step.dot_gain}
     return with_solution(estimate, step.solution, **others), step.profile_weight

@@ -14,13 +14,13 @@ from extractor.refine.measure.gridline_bending import LIMITS as BENDING_LIMITS
 from extractor.refine.measure.gridline_bending import BendingLimits, MarkerRows, measure_roughness
 from extractor.refine.measure.gridline_weights import LIMITS as WEIGHT_LIMITS
 from extractor.refine.measure.gridline_weights import GridlineWeightLimits
-from extractor.refine.measure.marker_scatter import measure_scatter
+from extractor.refine.measure.marker_scatter import MarkerScatter, measure_scatter
 from extractor.refine.solve.disagreement import LIMITS as DISAGREEMENT_LIMITS
 from extractor.refine.solve.disagreement import DisagreementLimits
 from extractor.refine.solve.fisher_information import LIMITS as INFORMATION_LIMITS
 from extractor.refine.solve.fisher_information import Information, InformationLimits
 from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
-from extractor.refine.synthesis.gridlines import gridlines
+from extractor.refine.synthesis.gridlines import GridlineLimits, gridlines
 
 PRIOR_PX = 10.0  # deviation of a marker before it is measured; chosen, far above any error
 
@@ -51,6 +51,7 @@ class StepLimits(NamedTuple):
         bending: of the gridlines.
         information: about the markers.
         disagreement: of the gridlines.
+        gridlines: of the maps that curve gridlines.
     """
 
     prior_px: float = PRIOR_PX
@@ -58,6 +59,7 @@ class StepLimits(NamedTuple):
     bending: BendingLimits = BENDING_LIMITS
     information: InformationLimits = INFORMATION_LIMITS
     disagreement: DisagreementLimits = DISAGREEMENT_LIMITS
+    gridlines: GridlineLimits = GRIDLINE_LIMITS
 
 
 LIMITS = StepLimits()
@@ -96,13 +98,18 @@ def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
     return estimate._replace(**extrapolate_pattern(estimate.reliable, topology)._asdict())
 
 
-def with_roughness(topology: Topology, estimate: Estimate, *, by_synthesis: bool) -> Estimate:
-    """The estimate with roughness and scatter of its markers, which a step by synthesis has placed, or profiles."""
-    rows = MarkerRows(topology.edges, topology.next_markers, topology.third_differences)
-    about = rows, topology.spokes, topology.ring_markers
+def scatter_of(topology: Topology, estimate: Estimate, *, by_synthesis: bool) -> MarkerScatter:
+    """The scatter of the estimate's markers, which a step by synthesis has placed, or profiles."""
     markers = estimate.reliable, estimate.maps, estimate.information.diagonal
-    scatter = measure_scatter(*markers, topology, by_synthesis=by_synthesis)
-    return estimate._replace(roughness=measure_roughness(*markers, *about), scatter=scatter)
+    return measure_scatter(*markers, topology, by_synthesis=by_synthesis)
+
+
+def with_bending(topology: Topology, estimate: Estimate, scatter: MarkerScatter) -> Estimate:
+    """The estimate with gridlines that may bend by the roughness of its markers, and by their scatter."""
+    rows = MarkerRows(topology.edges, topology.next_markers, topology.third_differences)
+    markers = estimate.reliable, estimate.maps, estimate.information.diagonal
+    roughness = measure_roughness(*markers, rows, topology.spokes, topology.ring_markers)
+    return estimate._replace(roughness=roughness, scatter=scatter)
 
 
 def gridlines_of(topology: Topology, estimate: Estimate) -> NDArray[np.float64]:

@@ -22,7 +22,6 @@ from extractor.refine.acceptance import (
     accepted_markers,
     add_dirt_variance,
     update_lost_markers,
-    update_obstructed_markers,
     update_unaccepted_markers,
 )
 from extractor.refine.estimate import (
@@ -38,18 +37,15 @@ from extractor.refine.measure.gridline_offsets import measure_virtual_markers
 from extractor.refine.measure.gridline_weights import (
     MIN_NOISE,
     MIN_SIGMA_PX,
-    SHORTEST_RARITY,
-    median_edge,
-    short_edges,
+    short_edge,
 )
-from extractor.refine.outliers import correct_outliers, find_outliers
+from extractor.refine.outliers import correct_outliers
 from extractor.refine.profile_rounds import profile_step
 from extractor.refine.recovered_markers import fill_recovered_markers
 from extractor.refine.refinement_step import (
     extrapolate_pattern,
     gridlines_of,
     with_pattern_moved,
-    with_roughness,
 )
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
@@ -98,16 +94,14 @@ class Refiner:
             places: the markers' places, to about a pixel.
             before: the appearance of the previous image of a sequence.
         """
-        short_edge, usual_edge = short_edges(
-            places.xy_px, self._topology.edges, SHORTEST_RARITY, SHORT_RARITY
-        )
+        usual_edge = short_edge(places.xy_px, self._topology.edges, SHORT_RARITY)
         if before is not None and before.scale == self._reduction_scale(
             before.scale * before.sigma, usual_edge
         ):
             view = pyramid.level(before.scale)
             first = self._first_estimate(view, places, places.xy_px, before)
-            refined = self._final_steps(view, *first, short_edge)
-            if refined.appearance is not None and refined.appearance.is_similar(before):
+            refined = self._final_steps(view, *first)
+            if refined.appearance.is_similar(before):
                 return refined
         view = pyramid.level(min(self._reduction_scale(SHARP_SIGMA_PX, usual_edge), 2))
         estimate, contrasts, places = self._first_estimate(view, places, places.xy_px)
@@ -118,7 +112,7 @@ class Refiner:
         elif scale < view.scale:
             xy = np.where(np.isfinite(places.xy_px), view.to_full_scale(estimate.measured), np.nan)
             estimate, contrasts, places = self._first_estimate(pyramid.level(scale), places, xy)
-        return self._final_steps(pyramid.level(scale), estimate, contrasts, places, short_edge)
+        return self._final_steps(pyramid.level(scale), estimate, contrasts, places)
 
     def _reduction_scale(self, sigma_px: float, edge_px: float) -> int:
         """The factor by which an image with this blur and these edges is reduced."""
@@ -134,7 +128,7 @@ class Refiner:
         start: NDArray[np.float64],
         before: Appearance | None = None,
     ) -> tuple[Estimate, EdgeContrasts, InitialMarkers]:
-        """The levels of the inks, the blur, and the first round of profiles.
+        """The levels of the inks, the blur, and the round of profiles.
 
         Args:
             view: the image.
@@ -163,16 +157,14 @@ class Refiner:
             roughness=np.zeros(markers),
             bend_variance=np.zeros(edges),
             bend=np.zeros((edges, 2)),
-            reading=None,
+            weight=np.ones(edges),
         )
         lines = gridlines_of(topology, estimate)
         contrasts = update_edge_contrasts(view, topology, estimate, lines)
         if before is None:
             estimate, contrasts = update_blur_and_bleed(view, topology, estimate, lines, contrasts)
-        stations = self._schedule.max_profile_rows[0]
-        estimate, profile_weight = profile_step(
-            view, topology, estimate, lines, contrasts, stations, judged=False
-        )
+        rows = self._schedule.max_profile_rows
+        estimate, profile_weight = profile_step(view, topology, estimate, lines, contrasts, rows)
         estimate, places = correct_outliers(view, topology, estimate, profile_weight, places)
         return estimate, contrasts, places
 
@@ -182,42 +174,20 @@ class Refiner:
         estimate: Estimate,
         contrasts: EdgeContrasts,
         places: InitialMarkers,
-        edge_px: float,
     ) -> RefinedMarkers:
-        """The last round of profiles, or synthesis where the blur requires it.
+        """The steps by synthesis.
 
         Args:
             view: the image.
-            estimate, contrasts: after the first round of profiles.
-            places, edge_px: the places and a short edge, of the full image.
+            estimate, contrasts: after the round of profiles.
+            places: of the full image.
         """
-        topology, schedule = self._topology, self._schedule
-        places, edge_px = places_in_view(view, places), edge_px / view.scale
+        places = places_in_view(view, places)
         if estimate.dot_gain != 0.0:
-            xy = markers_without_dot_gain(places.xy_px, topology.cells, estimate.dot_gain)
+            xy = markers_without_dot_gain(places.xy_px, self._topology.cells, estimate.dot_gain)
             places = replace(places, xy_px=xy)
-        start = with_pattern_moved(topology, estimate)
-        if estimate.sigma < schedule.sharp_blur_share * edge_px:
-            start = with_roughness(topology, start, by_synthesis=False)
-            return self._final_profiles(view, start, contrasts, places)
-        usual_px = median_edge(start.xy, topology.edges)
-        estimate = self._synthesis_solver.steps(view, start, schedule, usual_px)
+        estimate = self._synthesis_solver.steps(view, estimate, self._schedule)
         return self._accept_or_recover(view, estimate, contrasts, places)
-
-    def _final_profiles(
-        self, view: PyramidLevel, start: Estimate, contrasts: EdgeContrasts, places: InitialMarkers
-    ) -> RefinedMarkers:
-        """The markers after the last round of profiles; outliers are removed."""
-        topology, stations = self._topology, self._schedule.max_profile_rows[1]
-        lines = gridlines_of(topology, start)
-        estimate, profile_weight = profile_step(
-            view, topology, start, lines, contrasts, stations, judged=True
-        )
-        xy, cov = self._accepted_markers(estimate, places)
-        outliers, suspect = find_outliers(topology, estimate, xy, profile_weight, places.edge_px)
-        xy[outliers], cov[outliers] = np.nan, np.nan
-        update_obstructed_markers(xy, cov, suspect, start_places(places))
-        return self._refined_markers(view, estimate, xy, cov, ~suspect, places)
 
     def _accept_or_recover(
         self, view: PyramidLevel, estimate: Estimate, contrasts: EdgeContrasts, places: InitialMarkers
@@ -254,7 +224,7 @@ class Refiner:
         points = measure_virtual_markers(view, picture, reading, self._virtual)
         xy, cov = native.at_full_scale(xy, cov, start_places(places), scale, FULL_SCALE_LIMITS)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
-        appearance = Appearance(scale, *look) if reading.drawn else None
+        appearance = Appearance(scale, *look)
         blur, noise = scale * estimate.sigma, scale * estimate.noise
         return RefinedMarkers(
             xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)
@@ -269,8 +239,7 @@ class Refiner:
         xy, cov = accepted_markers(
             *measured, estimate.bend_variance, self._topology.edges, spokes, started, self._every_marker
         )
-        assert estimate.reading is not None
-        add_dirt_variance(cov, estimate.reading.weight, spokes, places.edge_px)
+        add_dirt_variance(cov, estimate.weight, spokes, places.edge_px)
         if estimate.convergence_cov_px2 is not None:
             cov += estimate.convergence_cov_px2
         return xy, cov

@@ -15,6 +15,7 @@ from extractor.presets import Schedule
 from extractor.refine.drawn_pattern import Synthesis, draw_pattern
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_offsets import GridlineReading
+from extractor.refine.measure.gridline_weights import median_edge
 from extractor.refine.measure.marker_scatter import NO_SCATTER
 from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
@@ -22,43 +23,61 @@ from extractor.refine.refinement_step import (
     MisfitRule,
     StepLimits,
     StepSolution,
+    scatter_of,
     step_solution,
+    with_bending,
     with_pattern_moved,
-    with_roughness,
     with_solution,
 )
-from extractor.refine.solve.convergence import WIDE_BLUR_REMAINDER, convergence_covariance, typical_move
+from extractor.refine.solve.convergence import (
+    convergence_covariance,
+    remaining_error,
+    remaining_share,
+    typical_deviation,
+)
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 
 WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending. Chosen
-# Gridlines overlap where blur is wide: a step falls short by OVERLAP_FACTOR times the square of blur over edge
-# (rendered patterns, shifted), at most by MAX_OVERLAP.
-OVERLAP_FACTOR, MAX_OVERLAP = 6.75, 0.4
 MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
-NO_CLEARANCE = np.empty((0, 4))
+READ_SUM = 0  # column of a drawing's sums; above 0 where a gridline is read
 
 
 class SynthesisLimits(NamedTuple):
     """Limits of a step by synthesis.
 
     Attributes:
+        max_steps: each over all markers. Chosen: clean pictures take one or two, dirt and scatter up to four.
         rule: rule of the gridlines' weights.
         step: of the step.
         dot_gain: of the dot gain.
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
             follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
             0.15 in the second step. Measured: rule "settled appearance".
+        full_weight: of a gridline; with less it looks unlike the pattern. Chosen.
+        few_doubted: share of such gridlines, below which no step may follow. Clean pictures have none, slips and dirt
+            1 % and more. Measured: rule "doubted gridlines".
+        small_bend: RMS change of the gridlines' bending in a step after which no step may follow, in deviations of a
+            marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
     """
 
+    max_steps: int = 4
     rule: MisfitRule = PIXEL_MISFIT_RULE
     step: StepLimits = STEP_LIMITS
     dot_gain: DotGainLimits = DOT_GAIN_LIMITS
     small_change: float = 0.05
+    full_weight: float = 0.9
+    few_doubted: float = 0.005
+    small_bend: float = 2.0
 
 
 LIMITS = SynthesisLimits()
+
+
+def is_blur_wide(sigma: float, edge_px: float) -> bool:
+    """Whether a usual edge, px, is blurred into the next by the blur, px."""
+    return sigma > WIDE_BLUR * edge_px
 
 
 class SynthesisReading(NamedTuple):
@@ -66,7 +85,7 @@ class SynthesisReading(NamedTuple):
 
     Attributes:
         weight: (E,) 0 to 1.
-        variance_ratio: (E,), as ``variance_ratios`` gives it; 1 in the first step.
+        variance_ratio: (E,), as ``variance_ratios`` gives it.
         bend_variance: (E,) px^2.
         dot_gain: px.
         dot_gain_offset: (E,) px.
@@ -114,55 +133,70 @@ class SynthesisSolver:
             kept[shape] = np.zeros(shape, np.float32)
         return kept[shape]
 
-    def steps(self, view: PyramidLevel, estimate: Estimate, schedule: Schedule, usual_px: float) -> Estimate:
-        """The estimate after steps over all markers, until a step hardly changes markers, blur and dot gain.
+    def steps(self, view: PyramidLevel, estimate: Estimate, schedule: Schedule) -> Estimate:
+        """The estimate after steps over all markers, until a further step would hardly change them.
 
         Args:
             view: the image.
-            estimate: with its pattern at the markers of the last step.
-            schedule: largest number of steps, and the move after which no step follows.
-            usual_px: a usual edge in the view.
+            estimate: after the round of profiles.
+            schedule: the error that a step may leave for no step to follow.
         """
-        wide_blur = estimate.sigma > WIDE_BLUR * usual_px  # a usual edge is blurred into the next
         shift = np.full_like(estimate.xy, np.nan)
-        for step in range(schedule.steps):
-            if step > 0:
-                estimate = with_pattern_moved(self._topology, estimate)
-            judged = step > 0  # the misfit of the first step is the misfit of its start
-            before = self._with_bending(estimate, wide_blur, judged)
-            stepped, drawing = self._full_step(view, before, judged)
-            estimate = _overlap_corrected(stepped, drawing)
-            change_px = abs(estimate.sigma - drawing.sigma) + abs(estimate.dot_gain - before.dot_gain)
-            is_settled = change_px < LIMITS.small_change * drawing.sigma
+        for step in range(LIMITS.max_steps):
+            before = self._drawn(estimate, by_synthesis=step > 0)
+            estimate, drawing = self._full_step(view, before)
             last, shift = shift, estimate.measured - drawing.xy
-            if judged and is_settled and typical_move(shift, estimate.information) < schedule.small_move:
+            share = remaining_share(drawing.sigma, drawing.edge_px)
+            cov = convergence_covariance(shift, last, drawing.sigma, share)
+            remainder = remaining_error(cov, estimate.information)
+            if remainder < schedule.small_remainder and self._is_settled(before, estimate, drawing):
                 break
-        remaining = WIDE_BLUR_REMAINDER * (drawing.sigma / drawing.edge_px) ** 2 if wide_blur else 0.0
-        cov = convergence_covariance(shift, last, drawing.sigma, remaining)
         return estimate._replace(convergence_cov_px2=cov)
 
-    def _with_bending(self, estimate: Estimate, wide_blur: bool, judged: bool) -> Estimate:
-        """The estimate with the roughness and the scatter that let its gridlines bend; without both where blur is wide.
+    def _drawn(self, estimate: Estimate, *, by_synthesis: bool) -> Estimate:
+        """The estimate with its pattern at the markers of the last step, and with gridlines that may bend.
 
         With wide blur, gridlines would bend instead of correcting the markers beside them.
         """
-        if wide_blur:
-            return _without_bending(estimate)
-        return with_roughness(self._topology, estimate, by_synthesis=judged)
+        moved = with_pattern_moved(self._topology, estimate)
+        if is_blur_wide(moved.sigma, median_edge(moved.xy, self._topology.edges)):
+            return _without_bending(moved)
+        return with_bending(
+            self._topology, moved, scatter_of(self._topology, moved, by_synthesis=by_synthesis)
+        )
 
-    def _full_step(self, view: PyramidLevel, estimate: Estimate, judged: bool) -> tuple[Estimate, Synthesis]:
+    def _is_settled(self, before: Estimate, after: Estimate, drawing: Synthesis) -> bool:
+        """Whether the next drawing would differ from the last one by small moves of the markers only.
+
+        Blur or dot gain that has changed, gridlines that look unlike the pattern or bend, and markers that scatter are
+        drawn otherwise.
+        """
+        change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
+        read = drawing.sums[:, READ_SUM] > 0.0
+        if change_px >= LIMITS.small_change * before.sigma or not read.any():
+            return False
+        if np.mean(after.weight[read] < LIMITS.full_weight) >= LIMITS.few_doubted:
+            return False
+        if is_blur_wide(before.sigma, drawing.edge_px):
+            return True
+        bend_px = np.sqrt(np.mean((after.bend[read] - before.bend[read]) ** 2))
+        if bend_px >= LIMITS.small_bend * typical_deviation(after.information):
+            return False
+        return scatter_of(self._topology, after, by_synthesis=True) == NO_SCATTER
+
+    def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
         """A step from all measurements."""
         drawing = draw_pattern(view, self._topology, estimate, self.picture(view.image.shape))
-        return self._update_estimate(estimate, drawing, judged), drawing
+        return self._update_estimate(estimate, drawing), drawing
 
-    def _update_estimate(self, estimate: Estimate, drawing: Synthesis, judged: bool) -> Estimate:
+    def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
         """The estimate after the step by the sums of the drawing."""
         topology, levels = self._topology, drawing.corrected_levels
-        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, judged, LIMITS)
+        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, LIMITS)
         read = SynthesisReading(*(*found[:-1], step_solution(*found[-1])))
         weights = read.weight, read.variance_ratio, read.dot_gain_offset
-        how = NO_CLEARANCE, *weights, drawing.sigma, read.noise, True
-        reading = GridlineReading(drawing.lines, drawing.sides, drawing.added, *how)
+        how = drawing.sides, drawing.added, *weights, drawing.sigma, read.noise
+        reading = GridlineReading(drawing.lines, *how)
         sigma = read.sigma
         levels = levels_at_blur(
             levels, estimate.xy, topology.cells, topology.cell_color, drawing.sigma, sigma
@@ -171,6 +205,7 @@ class SynthesisSolver:
             estimate,
             read.solution,
             bend_variance=read.bend_variance,
+            weight=read.weight,
             reading=reading,
             noise=read.noise,
             sigma=sigma,
@@ -183,11 +218,3 @@ def _without_bending(estimate: Estimate) -> Estimate:
     """The estimate with gridlines that may not bend."""
     roughness, bend = np.zeros_like(estimate.roughness), np.zeros_like(estimate.bend)
     return estimate._replace(roughness=roughness, bend=bend, scatter=NO_SCATTER)
-
-
-def _overlap_corrected(estimate: Estimate, drawing: Synthesis) -> Estimate:
-    """The estimate after a step of the length without overlap of gridlines."""
-    missing = min(OVERLAP_FACTOR * (drawing.sigma / drawing.edge_px) ** 2, MAX_OVERLAP)
-    measured = estimate.measured + missing / (1.0 - missing) * (estimate.measured - drawing.xy)
-    reliable = np.where(np.isnan(estimate.reliable), np.nan, measured)
-    return estimate._replace(measured=measured, reliable=reliable)

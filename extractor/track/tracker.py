@@ -18,7 +18,7 @@ from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.pipeline import Extractor, NumberedMarkers, Side, Stages, no_markers
 from extractor.presets import Preset
 from extractor.refine.estimate import Appearance
-from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edges
+from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edge
 from extractor.result import Markers, Origin, Reason, Status
 from extractor.track.displacement import Rest, fit_rest
 from extractor.track.image_check import check_cells, light_levels
@@ -94,7 +94,7 @@ class _TrackState:
         previous_px: (M, 2) float64, the markers of the previous frame; None where that frame was lost.
         cell_levels: (2, C, 3) float64, see ``CellCheck``; complete.
         cell_shift_px: (C, 2) float64, px at the scale of the next check, see ``resting_shifts``.
-        appearance: of the image, for refinement; None where the pattern was not drawn.
+        appearance: of the image, for refinement; None where no pattern was found.
         mirrored: the image shows the pattern's back.
         expected_count: largest number of measured markers since the last cold start.
         frames_since_cold: number of frames since the last cold start.
@@ -247,7 +247,7 @@ class Tracker:
 
     def _level_of_check(self, pyramid: Pyramid, xy_px: NDArray[np.float64]) -> PyramidLevel:
         """The image at the scale at which predictions are checked, for markers (M, 2), px."""
-        edge_px = float(short_edges(xy_px, self._sampled_edges, SHORTEST_RARITY, SHORTEST_RARITY)[0])
+        edge_px = short_edge(xy_px, self._sampled_edges, SHORTEST_RARITY)
         return pyramid.level(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
 
     def _refine_warm_start(

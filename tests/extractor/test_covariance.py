@@ -29,16 +29,17 @@ Squares = NDArray[np.float64]
 
 
 class FoundSquares(NamedTuple):
-    """d2 of all patterns, by picture, of measured markers: those inside, those of the outermost layer, virtual ones."""
+    """d2 of all patterns, by picture: of measured markers inside, of those of the outermost layer, of virtual ones."""
 
     inner: list[Squares]
     rim: list[Squares]
     virtual: list[Squares]
+    interpolated: list[Squares]
 
 
 @cache
 def squares_of(preset: str, kind: str) -> FoundSquares:
-    found = FoundSquares([], [], [])
+    found = FoundSquares([], [], [], [])
     for pattern in PATTERNS:
         case = SceneCase(pattern, kind, layers=LAYERS)
         scene, extractor = case.scene(), cached_extractor(case, preset)  # type: ignore[arg-type]
@@ -53,9 +54,13 @@ def squares_of(preset: str, kind: str) -> FoundSquares:
             found.inner.append(squared_distances(error[mine], markers.cov_px2[mine]))
             rim = outermost & (markers.status == Status.MEASURED)
             found.rim.append(squared_distances(error[rim], markers.cov_px2[rim]))
-            virtual = markers.virtual_status == VirtualStatus.MEASURED
             error = markers.virtual_xy_px - seen.truth.virtual_xy_px
-            found.virtual.append(squared_distances(error[virtual], markers.virtual_cov_px2[virtual]))
+            for squares, status in (
+                (found.virtual, VirtualStatus.MEASURED),
+                (found.interpolated, VirtualStatus.INTERPOLATED),
+            ):
+                virtual = markers.virtual_status == status
+                squares.append(squared_distances(error[virtual], markers.virtual_cov_px2[virtual]))
     return found
 
 
@@ -64,7 +69,7 @@ def squares_of(preset: str, kind: str) -> FoundSquares:
 def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> None:
     d2 = squares_of(preset, kind).inner
     found = summarise(d2)
-    least, most = {"fast": (0.85, 1.3), "balanced": (0.9, 1.15), "accurate": (0.9, 1.1)}[preset]
+    least, most = {"fast": (0.8, 1.15), "balanced": (0.83, 1.15), "accurate": (0.9, 1.1)}[preset]
     assert least < found.z.value < most
     assert 0.8 < found.median_z < 1.2  # the bulk of them, too
     # six deviations per axis; fast leaves a marker whose triangles were wrong by a quarter of a pixel
@@ -74,8 +79,8 @@ def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> 
 @pytest.mark.parametrize("kind", ["flat", "tilt"])
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_outermost_layer_has_larger_covariances(preset: str, kind: str) -> None:
-    """Maps are one-sided there. With the couplings of inner gridlines, z would be 1.26 to 1.37."""
-    assert 0.9 < summarise(squares_of(preset, kind).rim).z.value < 1.22
+    """Maps are one-sided there. With the couplings of moved ends, z would be up to 1.22."""
+    assert 0.9 < summarise(squares_of(preset, kind).rim).z.value < 1.12
 
 
 @pytest.mark.parametrize("kind", SCENE_KINDS)
@@ -83,7 +88,37 @@ def test_the_outermost_layer_has_larger_covariances(preset: str, kind: str) -> N
 def test_the_covariance_of_a_measured_virtual_marker_is_true(preset: str, kind: str) -> None:
     found = summarise(squares_of(preset, kind).virtual)
     assert found.count > 1000 and not found.singular
-    assert 0.85 < found.z.value < (1.25 if preset == "fast" else 1.2)
+    assert 0.8 < found.z.value < (1.25 if preset == "fast" else 1.2)
+
+
+@pytest.mark.parametrize("kind", ["flat", "tilt"])
+@pytest.mark.parametrize("preset", ["balanced", "accurate"])
+def test_the_covariance_of_an_interpolated_virtual_marker_holds_the_errors_of_the_map(
+    preset: str, kind: str
+) -> None:
+    """There is no contrast between black cells. With the errors of the two markers alone, z would be up to 1.2."""
+    found = summarise(squares_of(preset, kind).interpolated)
+    assert found.count > 1000
+    assert 0.9 < found.z.value < 1.15
+
+
+@pytest.mark.parametrize("preset", ["fast", "balanced"])
+def test_virtual_markers_between_rounded_cells_lie_on_the_gridlines(preset: str) -> None:
+    """The sides of all cells are shifted alike, most at their ends. With these shifts, errors would be two to three
+    times as large.
+    """
+    d2, squares = [], []
+    for case in camera_cases(False, 11):
+        if case.kind == "rounded corners" and len(d2) < 4:
+            seen = case.shoot()
+            extractor = Extractor(parse_layout(layout_to_json(case.layout)), preset, side="either")  # type: ignore[arg-type]
+            markers = extractor.extract(seen.image)
+            mine = markers.virtual_status == VirtualStatus.MEASURED
+            error = (markers.virtual_xy_px - seen.truths[0].virtual_xy_px)[mine]
+            d2.append(squared_distances(error, markers.virtual_cov_px2[mine]))
+            squares.append((error**2).mean(axis=1))
+    assert np.sqrt(np.concatenate(squares).mean()) < 0.2
+    assert 0.6 < summarise(d2).z.value < 1.1
 
 
 @pytest.mark.parametrize("preset", ["balanced", "accurate"])

@@ -10,11 +10,21 @@
 
 namespace cmp::complete {
 
+namespace {
+
+std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 1>> places_by_layer(
+    View<const double, 2> xy, View<const double, 1> noise_px2, Index layers, const LayerLimits& limits) {
+  LayerPrediction found = predict_by_layer(xy, noise_px2, layers, limits);
+  return {std::move(found.xy_px), std::move(found.misfit_px2), std::move(found.variance_px2)};
+}
+
+}  // namespace
+
 void add_complete(nb::module_ module) {
   bind<&update_rejecting_inconsistent>(module, "update_rejecting_inconsistent",
                                        {"xy", "cov", "evidence", "tables", "size", "limits"});
   bind<&find_uncertain_markers>(module, "find_uncertain_markers", {"cov", "edge_px", "limits"});
-  bind<&predict_by_layer>(module, "predict_by_layer", {"xy", "layers", "limits"});
+  bind<&places_by_layer>(module, "predict_by_layer", {"xy", "noise_px2", "layers", "limits"});
   bind<&fill_lost_markers>(module, "fill_lost_markers", {"markers", "tables", "size", "limits"});
   bind<&locate_on_edges>(module, "locate_on_edges", {"ends", "topology", "points", "limits"});
   bind<&centers>(module, "centers", {"xy", "corners"});

@@ -80,7 +80,8 @@ class Rejection {
         tables_(tables),
         limits_(limits),
         misfit_({xy.size()}, 0.0),
-        doubtful_({xy.size()}, false) {}
+        doubtful_({xy.size()}, false),
+        no_noise_({xy.size()}, 0.0) {}
 
   void run(Edges tolerance_px) {
     std::vector<Index> pending(static_cast<std::size_t>(xy_.size()));
@@ -103,8 +104,8 @@ class Rejection {
 
  private:
   void update_misfit() {
-    const auto predicted =
-        localmap::predict_markers(xy_, doubtful_, tables_.marker_mm, tables_.neighbours, limits_.maps);
+    const auto predicted = localmap::predict_markers(xy_, no_noise_, doubtful_, tables_.marker_mm,
+                                                     tables_.neighbours, limits_.maps);
     for (Index m = 0; m < xy_.size(); ++m) {
       if (!doubtful_[m]) continue;
       const double distance =
@@ -150,6 +151,7 @@ class Rejection {
   const ConsistencyLimits& limits_;
   Array<double, 1> misfit_;
   Array<bool, 1> doubtful_;
+  Array<double, 1> no_noise_;
 };
 
 }  // namespace

@@ -20,10 +20,7 @@ struct ConsistencyLimits {
 
   template <class F>
   static ConsistencyLimits read(const F& f) {
-    return {f["max_rounds"],
-            f["max_distance"],
-            f["max_predicted_deviation"],
-            f["max_unexplained_distance"],
+    return {f["max_rounds"], f["max_distance"], f["max_predicted_deviation"], f["max_unexplained_distance"],
             f["maps"]};
   }
 };

@@ -16,10 +16,31 @@ constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 using Ids = View<const Index, 1>;
 
+// A sum of squares, px^2, and its degrees of freedom.
+struct Squares {
+  double sum = 0.0, freedom = 0.0;
+
+  void add(const Squares& other) {
+    sum += other.sum;
+    freedom += other.freedom;
+  }
+  // per degree of freedom, together with the mean of others, which counts as so many degrees of freedom
+  double mean_with(const Squares& others, double count) const {
+    return (sum + count * others.sum / others.freedom) / (freedom + count);
+  }
+};
+
+// How the errors of known markers move a place on a quadratic: the factor of a variance that all have, and
+// the variance by their own, px^2.
+struct Influence {
+  double leverage, noise;
+};
+
 // The quadratics of x and y through the known markers of a sextant of a layer.
 class LayerQuadratic {
  public:
-  LayerQuadratic(View<const double, 2> xy, Ids ids) : xy_(xy), ids_(ids), last_(ids.size() - 1) {
+  LayerQuadratic(View<const double, 2> xy, View<const double, 1> noise, Ids ids)
+      : xy_(xy), noise_(noise), ids_(ids), last_(ids.size() - 1) {
     for (Index k = 0; k <= last_; ++k) {
       if (!is_known(k)) continue;
       begin_ = begin_ < 0 ? k : begin_;
@@ -27,24 +48,41 @@ class LayerQuadratic {
       ++count_;
       add(k);
     }
-  }
-
-  void solve() {
     auto gram = normal_;
     numeric::update_to_cholesky_solution(View<double, 2>(gram.data(), {TERMS, TERMS}),
                                          View<double, 2>(terms_.data(), {2, TERMS}), TERMS);
   }
 
-  // writes places and variances of the unknown markers between known ones, where the variance is smaller
-  void update(View<double, 2> predicted, View<double, 1> variance) const {
-    const double residual = mean_square();
+  // the residuals of both axes
+  Squares residuals() const {
+    Squares out{0.0, 2.0 * static_cast<double>(count_ - TERMS)};
+    for (Index k = begin_; k <= end_; ++k) {
+      if (!is_known(k)) continue;
+      const double s = place(k);
+      for (Index axis = 0; axis < 2; ++axis) {
+        const double left = xy_(ids_[k], axis) - term(axis, 0), misfit = left - s * rising_part(axis, s);
+        out.sum += misfit * misfit;
+      }
+    }
+    return out;
+  }
+
+  // Writes the places of the unknown markers between known ones into `out` where the misfit is smaller.
+  //
+  // residual: variance of the markers about quadratics, px^2.
+  void update(double residual, LayerPrediction& out) const {
+    const Squares own = residuals();
+    const double own_residual = own.sum / own.freedom;
     for (Index k = begin_; k <= end_; ++k) {
       if (is_known(k)) continue;
-      const double s = place(k), own_variance = residual * variance_factor(s);
+      const double s = place(k);
+      const Influence influence = influence_at(s);
+      const double misfit = own_residual * (1.0 + influence.leverage);
       const Index m = ids_[k];
-      if (!(own_variance < variance[m])) continue;
-      variance[m] = own_variance;
-      for (Index axis = 0; axis < 2; ++axis) predicted(m, axis) = term(axis, 0) + s * rising_part(axis, s);
+      if (!(misfit < out.misfit_px2[m])) continue;
+      out.misfit_px2[m] = misfit;
+      out.variance_px2[m] = residual * (1.0 + influence.leverage) + influence.noise;
+      for (Index axis = 0; axis < 2; ++axis) out.xy_px(m, axis) = term(axis, 0) + s * rising_part(axis, s);
     }
   }
 
@@ -63,41 +101,35 @@ class LayerQuadratic {
     }
   }
 
-  // of the residuals, per axis
-  double mean_square() const {
-    double squares = 0.0;
-    for (Index k = begin_; k <= end_; ++k) {
-      if (!is_known(k)) continue;
-      const double s = place(k);
-      for (Index axis = 0; axis < 2; ++axis) {
-        const double left = xy_(ids_[k], axis) - term(axis, 0), misfit = left - s * rising_part(axis, s);
-        squares += misfit * misfit;
-      }
-    }
-    return squares / (2.0 * static_cast<double>(count_ - TERMS));
-  }
-
-  // from the variance of a marker to that of its difference from the quadratic at s
-  double variance_factor(double s) const {
+  // of the known markers on the quadratic at s
+  Influence influence_at(double s) const {
     auto gram = normal_;
     std::array<double, TERMS> unit{1.0, s, s * s};
     numeric::update_to_cholesky_solution(View<double, 2>(gram.data(), {TERMS, TERMS}),
                                          View<double, 2>(unit.data(), {1, TERMS}), TERMS);
-    return 1.0 + unit[0] + s * (unit[1] + s * unit[2]);
+    const auto weight_of = [&unit](double at) { return unit[0] + at * (unit[1] + at * unit[2]); };
+    Influence out{weight_of(s), 0.0};
+    for (Index k = begin_; k <= end_; ++k) {
+      if (!is_known(k)) continue;
+      const double weight = weight_of(place(k));
+      out.noise += weight * weight * noise_[ids_[k]];
+    }
+    return out;
   }
 
   View<const double, 2> xy_;
+  View<const double, 1> noise_;
   Ids ids_;
   Index last_, count_ = 0, begin_ = -1, end_ = -1;
   std::array<double, TERMS * TERMS> normal_{};
   std::array<double, 2 * TERMS> terms_{};  // right sides at first
 };
 
-}  // namespace
-
-LayerPrediction predict_by_layer(View<const double, 2> xy, Index layers, const LayerLimits& limits) {
-  Array<double, 2> predicted(xy.shape(), NOT_A_NUMBER);
-  Array<double, 1> variance({xy.size()}, std::numeric_limits<double>::infinity());
+// Calls visit(quadratic, unknown) for every sextant of every layer with enough known markers; unknown: how
+// many are not.
+template <class Visit>
+void for_quadratics(View<const double, 2> xy, View<const double, 1> noise, Index layers,
+                    const LayerLimits& limits, Visit visit) {
   Array<Index, 1> buffer({layers + 1});
   for (Index layer = 1; layer <= layers; ++layer) {
     const Index first = 3 * layer * (layer - 1) + 1, count = SEXTANTS * layer;
@@ -108,13 +140,26 @@ LayerPrediction predict_by_layer(View<const double, 2> xy, Index layers, const L
         ids[k] = first + (sextant * layer + k) % count;
         unknown += std::isnan(xy(ids[k], 0)) ? 1 : 0;
       }
-      if (unknown == 0 || layer + 1 - unknown < limits.min_markers) continue;
-      LayerQuadratic quadratic(xy, ids);
-      quadratic.solve();
-      quadratic.update(predicted, variance);
+      if (layer + 1 - unknown >= limits.min_markers) visit(LayerQuadratic(xy, noise, ids), unknown);
     }
   }
-  return {std::move(predicted), std::move(variance)};
+}
+
+}  // namespace
+
+LayerPrediction predict_by_layer(View<const double, 2> xy, View<const double, 1> noise_px2, Index layers,
+                                 const LayerLimits& limits) {
+  constexpr double NONE = std::numeric_limits<double>::infinity();
+  LayerPrediction out{Array<double, 2>(xy.shape(), NOT_A_NUMBER), Array<double, 1>({xy.size()}, NONE),
+                      Array<double, 1>({xy.size()}, NONE)};
+  Squares all;
+  for_quadratics(xy, noise_px2, layers, limits,
+                 [&](const LayerQuadratic& quadratic, Index) { all.add(quadratic.residuals()); });
+  for_quadratics(xy, noise_px2, layers, limits, [&](const LayerQuadratic& quadratic, Index unknown) {
+    if (unknown == 0) return;
+    quadratic.update(quadratic.residuals().mean_with(all, limits.picture_freedom), out);
+  });
+  return out;
 }
 
 }  // namespace cmp::complete

@@ -1,8 +1,6 @@
 // Heavy omission (the article's Fig. 8): a quadratic through the markers of one layer within a sextant.
 #pragma once
 
-#include <tuple>
-
 #include "base/array.hpp"
 
 namespace cmp::complete {
@@ -10,20 +8,26 @@ namespace cmp::complete {
 // Limits of these quadratics; explained in extractor/complete/layer_arcs.py.
 struct LayerLimits {
   std::int64_t min_markers;
+  double picture_freedom;
 
   template <class F>
   static LayerLimits read(const F& f) {
-    return {f["min_markers"]};
+    return {f["min_markers"], f["picture_freedom"]};
   }
 };
 
-using LayerPrediction = std::tuple<Array<double, 2>, Array<double, 1>>;
+// Places of M markers on the quadratics through their layers and sextants.
+struct LayerPrediction {
+  Array<double, 2> xy_px;       // (M, 2) NaN where there are too few markers, as where a marker is known
+  Array<double, 1> misfit_px2;  // (M,) from the marker to the quadratic, per axis, by its own residuals alone
+  Array<double, 1> variance_px2;  // (M,) of the place, per axis; both are infinite without a place
+};
 
 // Places of the unknown markers between known ones, on the quadratic through their layer and sextant.
 //
-// xy (M, 2) px, NaN where unknown. (M, 2) px, NaN where there are too few markers; and (M,) the variance of
-// these places, px^2 per axis, from the residual of the fit, infinite without a place. For a corner of the
-// layer, which two sextants share, the place with the smaller variance is taken.
-LayerPrediction predict_by_layer(View<const double, 2> xy, Index layers, const LayerLimits& limits);
+// xy (M, 2) px, NaN where unknown; noise_px2 (M,) the variances of the known ones per axis. For a corner of
+// the layer, which two sextants share, the place with the smaller misfit is taken.
+LayerPrediction predict_by_layer(View<const double, 2> xy, View<const double, 1> noise_px2, Index layers,
+                                 const LayerLimits& limits);
 
 }  // namespace cmp::complete

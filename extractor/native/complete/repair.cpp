@@ -43,6 +43,8 @@ Array<double, 1> interpolated_edges(View<const double, 1> edge_px, View<const st
 }
 
 // The variance of a lost marker's place by the two rings around it, px^2; NaN where the place is not safe.
+//
+// What the neighbours' noise does not explain of their misfit is the surface's departure from the map.
 double variance_by_neighbours(Index m, const MarkerPredictions& rings, double edge_px,
                               const RepairLimits& limits) {
   const double variance = rings.variance_px2[m], leverage = rings.leverage[m];
@@ -50,15 +52,16 @@ double variance_by_neighbours(Index m, const MarkerPredictions& rings, double ed
   if (rings.neighbour_count[m] < limits.mild_support ||
       !(leverage < limits.max_leverage && upper_bound < square(limits.max_repaired_deviation * edge_px)))
     return NOT_A_NUMBER;
-  return square(limits.mild_error * leverage) * variance;
+  const double departure = std::max(variance - rings.neighbour_noise_px2[m], 0.0);
+  return rings.noise_px2[m] + square(limits.mild_error * leverage) * departure;
 }
 
-// The same by the quadratic through the marker's layer, from the variance of its residual, px^2.
-double variance_by_layer(double residual, double edge_px, const RepairLimits& limits) {
-  if (!(residual + square(limits.fitted_model_sigmas * limits.model_deviation * edge_px) <
+// The same by the quadratic through the marker's layer, px^2.
+double variance_by_layer(Index m, const LayerPrediction& found, double edge_px, const RepairLimits& limits) {
+  if (!(found.misfit_px2[m] + square(limits.fitted_model_sigmas * limits.model_deviation * edge_px) <
         square(limits.max_fitted_deviation * edge_px)))
     return NOT_A_NUMBER;
-  return limits.heavy_error * residual + square(limits.model_deviation * edge_px);
+  return found.variance_px2[m];
 }
 
 // The repair of the lost markers and the fusion of the uncertain ones.
@@ -98,7 +101,15 @@ class Repair {
  private:
   // by two rings, NaN where unknown
   MarkerPredictions predictions(View<const bool, 1> wanted) const {
-    return localmap::predict_markers(known_, wanted, tables_.marker_mm, tables_.neighbours, limits_.maps);
+    return localmap::predict_markers(known_, noise_px2(), wanted, tables_.marker_mm, tables_.neighbours,
+                                     limits_.maps);
+  }
+
+  // (M,) the markers' variances per axis, NaN where unknown
+  Array<double, 1> noise_px2() const {
+    Array<double, 1> out({count_});
+    for (Index m = 0; m < count_; ++m) out[m] = 0.5 * (cov_(m, 0, 0) + cov_(m, 1, 1));
+    return out;
   }
 
   // writes a marker's place and isotropic covariance; false if the variance is NaN or the place not in the
@@ -143,11 +154,11 @@ class Repair {
 
   // the weakest and slowest prediction, only for the remaining markers
   void fill_by_layer() {
-    const auto [layer_xy, layer_variance] = predict_by_layer(known_, tables_.layers, limits_.layers);
+    const LayerPrediction found = predict_by_layer(known_, noise_px2(), tables_.layers, limits_.layers);
     for (Index m = 0; m < count_; ++m) {
       if (!lost_[m]) continue;
       status_[m] = FITTED;
-      fill(m, layer_xy[m], variance_by_layer(layer_variance[m], edge_px_[m], limits_));
+      fill(m, found.xy_px[m], variance_by_layer(m, found, edge_px_[m], limits_));
     }
   }
 

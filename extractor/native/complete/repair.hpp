@@ -17,7 +17,7 @@ struct RepairLimits {
   std::int64_t mild_support;
   double max_repaired_deviation, max_fitted_deviation, max_leverage;
   double model_deviation, fitted_model_sigmas;
-  double mild_error, heavy_error;
+  double mild_error;
   LayerLimits layers;
   layout::NeighbourMapLimits maps;
 
@@ -30,7 +30,6 @@ struct RepairLimits {
             f["model_deviation"],
             f["fitted_model_sigmas"],
             f["mild_error"],
-            f["heavy_error"],
             f["layers"],
             f["maps"]};
   }

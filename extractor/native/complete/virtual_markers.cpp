@@ -47,9 +47,10 @@ void update_for_scatter(Vector& tangent, Vector chord, Vector near, Vector far, 
   tangent.y += share * (chord.y - (2 * near.y + far.y) / 6 - tangent.y);
 }
 
-// A virtual marker from the start of its edge: place, covariance and status.
+// A virtual marker from the start of its edge: place, covariance, the part of its variance by unknown
+// bending, and status.
 struct Located {
-  double x, y, xx, cross, yy;
+  double x, y, xx, cross, yy, by_bending;
   std::uint8_t status;
 };
 
@@ -89,6 +90,7 @@ struct Gridline {
             s * s * cov_a(0, 0) + t * t * cov_b(0, 0) + bend_variance,
             s * s * cov_a(0, 1) + t * t * cov_b(0, 1),
             s * s * cov_a(1, 1) + t * t * cov_b(1, 1) + bend_variance,
+            bend_variance,
             INTERPOLATED};
   }
 
@@ -108,6 +110,74 @@ struct Gridline {
   }
 };
 
+// How an interpolated point moves with the markers from which its map and its edge follow.
+class MarkerWeights {
+ public:
+  MarkerWeights(const GridlineEnds& ends, const layout::Topology& topology)
+      : ends_(ends),
+        topology_(topology),
+        weight_({ends.xy_px.size()}, 0.0),
+        markers_({2 * (topology.ring_markers.size(1) + 2)}) {}
+
+  // whether the map at marker m is that of the stencil, through known markers
+  bool is_by_stencil(Index m) const {
+    if (topology_.derivative_stencil(m, 0, 0) == 0.0 && topology_.derivative_stencil(m, 0, 1) == 0.0)
+      return false;
+    for (const std::int32_t n : topology_.ring_markers[m])
+      if (n >= 0 && !ends_.known[n]) return false;
+    return true;
+  }
+
+  // writes the covariance of the point at the share t of edge e by the independent errors of the markers
+  void update_covariance(Index e, double t, Located& point) {
+    const double s = 1.0 - t, share = ends_.scatter.share, end = t * t * (3 - 2 * t);
+    const double slope_a = s * s * t, slope_b = s * t * t;
+    const Index a = topology_.edges(e, 0), b = topology_.edges(e, 1);
+    count_ = 0;
+    add(b, end + share * (slope_a - slope_b));
+    add(a, 1.0 - end - share * (slope_a - slope_b));
+    add_map(a, e, (1.0 - share) * slope_a, -share * (2 * slope_a + slope_b) / 6);
+    add_map(b, e, -(1.0 - share) * slope_b, -share * (2 * slope_b + slope_a) / 6);
+    point.xx = point.yy = point.by_bending;
+    point.cross = 0.0;
+    for (const Index m : markers_.view().slice(0, count_)) {
+      const double square = weight_[m] * weight_[m];
+      point.xx += square * ends_.cov_px2(m, 0, 0);
+      point.cross += square * ends_.cov_px2(m, 0, 1);
+      point.yy += square * ends_.cov_px2(m, 1, 1);
+      weight_[m] = 0.0;
+    }
+  }
+
+ private:
+  void add(Index m, double weight) {
+    if (weight_[m] == 0.0) markers_[count_++] = m;
+    weight_[m] += weight;
+  }
+
+  // adds the first and the second derivative along edge e by the map at marker m, each times a factor
+  void add_map(Index m, Index e, double first, double second) {
+    const double u = topology_.edge_vectors(e, 0), v = topology_.edge_vectors(e, 1);
+    const auto stencil = topology_.derivative_stencil[m];
+    double total = 0.0;
+    for (Index k = 0; k < stencil.size(1); ++k) {
+      const std::int32_t n = topology_.ring_markers(m, k);
+      if (n < 0) continue;
+      const double curving = u * u * stencil(2, k) + 2 * u * v * stencil(3, k) + v * v * stencil(4, k);
+      const double weight = first * (u * stencil(0, k) + v * stencil(1, k)) + second * curving;
+      add(n, weight);
+      total += weight;
+    }
+    add(m, -total);
+  }
+
+  const GridlineEnds& ends_;
+  const layout::Topology& topology_;
+  Array<double, 1> weight_;  // (M,) 0 between two points
+  Array<std::int64_t, 1> markers_;
+  Index count_ = 0;  // of the markers with a weight
+};
+
 }  // namespace
 
 VirtualMarkers locate_on_edges(const GridlineEnds& ends, const layout::Topology& topology,
@@ -116,16 +186,19 @@ VirtualMarkers locate_on_edges(const GridlineEnds& ends, const layout::Topology&
   Array<double, 3> xy({count, m, 2}, NOT_A_NUMBER);
   Array<double, 4> cov({count, m, 2, 2}, NOT_A_NUMBER);
   Array<std::uint8_t, 2> status({count, m}, LOST);
+  MarkerWeights weights(ends, topology);
   for (Index e = 0; e < count; ++e) {
     const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
     if (!(ends.known[a] && ends.known[b])) continue;
     const Gridline gridline(ends, topology, e, a, b);
     const double free_variance = ends.scatter.bend_variance(topology.scatter_bending[e]);
     const double limit_px = limits.max_measured_offset * gridline.length;
+    const bool by_stencil = weights.is_by_stencil(a) && weights.is_by_stencil(b);
     for (Index j = 0; j < m; ++j) {
       const double t = static_cast<double>(j + 1) / static_cast<double>(m + 1);
       Located point = gridline.at(t, limits.bend_uncertainty, free_variance);
       gridline.update_to_measured(points[e][j], limit_px, point);
+      if (point.status == INTERPOLATED && by_stencil) weights.update_covariance(e, t, point);
       status(e, j) = point.status;
       xy(e, j, 0) = gridline.x0 + point.x;
       xy(e, j, 1) = gridline.y0 + point.y;

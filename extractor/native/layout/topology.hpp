@@ -27,6 +27,7 @@ struct Topology {
   // (E, 6) how a gridline moves with its start, its end and the other end, relative to a straight line: three
   // by tangents, three by second derivatives
   View<const double, 2> end_couplings;
+  View<const double, 2> covariance_couplings;  // (E, 6) the same of the covariances
   // (E, 3) of a gridline's b, over the variance of the scatter: its variance with the map's tangents, its
   // covariance with, and the variance of, that with second derivatives
   View<const double, 2> scatter_bending;
@@ -48,6 +49,7 @@ struct Topology {
             f["third_differences"],
             f["next_edges"],
             f["end_couplings"],
+            f["covariance_couplings"],
             f["scatter_bending"]};
   }
 };

@@ -10,12 +10,14 @@ namespace cmp::localmap {
 
 namespace {
 
-std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 1>, Array<std::int32_t, 1>> predict(
-    View<const double, 2> xy_px, View<const bool, 1> wanted, View<const double, 2> marker_mm,
-    View<const std::int32_t, 2> table, const NeighbourMapLimits& limits) {
-  auto found = predict_markers(xy_px, wanted, marker_mm, table, limits);
-  return {std::move(found.xy_px), std::move(found.variance_px2), std::move(found.leverage),
-          std::move(found.neighbour_count)};
+std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 1>, Array<double, 1>, Array<double, 1>,
+           Array<std::int32_t, 1>>
+predict(View<const double, 2> xy_px, View<const double, 1> noise_px2, View<const bool, 1> wanted,
+        View<const double, 2> marker_mm, View<const std::int32_t, 2> table,
+        const NeighbourMapLimits& limits) {
+  auto found = predict_markers(xy_px, noise_px2, wanted, marker_mm, table, limits);
+  return {std::move(found.xy_px),     std::move(found.variance_px2),        std::move(found.leverage),
+          std::move(found.noise_px2), std::move(found.neighbour_noise_px2), std::move(found.neighbour_count)};
 }
 
 }  // namespace
@@ -24,7 +26,7 @@ void add_localmap(nb::module_ module) {
   bind<&completed_linear_maps>(module, "completed_linear_maps",
                                {"center_px", "corner_px", "cell", "mirrored", "layout", "limits"});
   bind<&lattice_bases>(module, "lattice_bases", {"center", "axial", "limits"});
-  bind<&predict>(module, "predict_markers", {"xy_px", "wanted", "marker_mm", "table", "limits"});
+  bind<&predict>(module, "predict_markers", {"xy_px", "noise_px2", "wanted", "marker_mm", "table", "limits"});
   bind<&fill_quadratic_derivatives>(module, "fill_quadratic_derivatives",
                                     {"xy", "markers", "ring_markers", "ring_vectors", "out", "limits"});
 }

@@ -14,6 +14,8 @@ struct MarkerPredictions {
   Array<double, 2> xy_px;         // (M, 2) the predicted places
   Array<double, 1> variance_px2;  // (M,) the residual variance per axis of the neighbours
   Array<double, 1> leverage;      // (M,) from the variance of the neighbours to that of the prediction
+  Array<double, 1> noise_px2;     // (M,) the variance per axis of the prediction by the neighbours' noise
+  Array<double, 1> neighbour_noise_px2;    // (M,) the mean of the neighbours' noise
   Array<std::int32_t, 1> neighbour_count;  // (M,) the number of known neighbours
 };
 
@@ -35,10 +37,10 @@ inline bool is_neighbour_outlier(View<const double, 2> xy_px, Index m, double li
 
 // Predicts the wanted markers (M,) from their neighbours; a marker's own place is not used.
 //
-// xy_px (M, 2) the markers' places, NaN unknown; marker_mm (M, 2) in the layout; table (M, K), the neighbours
-// of each marker, or -1.
-MarkerPredictions predict_markers(View<const double, 2> xy_px, View<const bool, 1> wanted,
-                                  View<const double, 2> marker_mm, View<const std::int32_t, 2> table,
-                                  const NeighbourMapLimits& limits);
+// xy_px (M, 2) the markers' places, NaN unknown; noise_px2 (M,) their variances per axis; marker_mm (M, 2) in
+// the layout; table (M, K), the neighbours of each marker, or -1.
+MarkerPredictions predict_markers(View<const double, 2> xy_px, View<const double, 1> noise_px2,
+                                  View<const bool, 1> wanted, View<const double, 2> marker_mm,
+                                  View<const std::int32_t, 2> table, const NeighbourMapLimits& limits);
 
 }  // namespace cmp::localmap

@@ -8,7 +8,7 @@ using numeric::LaneRow;
 using numeric::LANES;
 using numeric::packed_index;
 
-Index RingMaps::fill_neighbours(View<const double, 2> xy, Index m, Index lane,
+Index RingMaps::fill_neighbours(View<const double, 2> xy, View<const double, 1> noise, Index m, Index lane,
                                 View<const double, 2> marker_mm, View<const std::int32_t, 2> table) {
   double scale = 0.0;
   Index n = 0;
@@ -23,6 +23,7 @@ Index RingMaps::fill_neighbours(View<const double, 2> xy, Index m, Index lane,
     to.y[lane] = y;
     to.u[lane] = is_known ? xy(j, 0) : 0.0;
     to.v[lane] = is_known ? xy(j, 1) : 0.0;
+    to.noise[lane] = is_known ? noise[j] : 0.0;
     if (!is_known) continue;
     scale += std::hypot(x, y);
     ++n;
@@ -69,10 +70,21 @@ void RingMaps::add_squared_misfit(const NeighbourRows& neighbour) {
   squared_misfit_ = squares;
 }
 
+// Independent errors of the neighbours move the place by their sum, each times its neighbour's weight.
+void RingMaps::add_noise(const NeighbourRows& neighbour) {
+  const Terms terms = terms_of(neighbour);
+  for (Index lane = 0; lane < LANES; ++lane) {
+    double weight = 0.0;
+    for (Index a = 0; a < TERMS; ++a) weight += sides_[FOR_LEVERAGE][a][lane] * terms[a][lane];
+    noise_[lane] += weight * weight * neighbour.noise[lane];
+    summed_noise_[lane] += neighbour.noise[lane];
+  }
+}
+
 void RingMaps::solve(double min_pivot) {
   normal_ = {};
   sides_ = {};
-  squared_misfit_.fill(0.0);
+  for (LaneRow* sum : {&squared_misfit_, &noise_, &summed_noise_}) sum->fill(0.0);
   determined_.fill(1.0);
   sides_[FOR_LEVERAGE][0].fill(1.0);
   for (const NeighbourRows& neighbour : neighbours_) add_to_normal_equations(neighbour);
@@ -83,7 +95,10 @@ void RingMaps::solve(double min_pivot) {
   }
   numeric::update_to_cholesky_factors<TERMS>(normal_.data(), min_pivot, determined_);
   for (Terms& side : sides_) numeric::update_to_solutions<TERMS>(normal_.data(), side.data());
-  for (const NeighbourRows& neighbour : neighbours_) add_squared_misfit(neighbour);
+  for (const NeighbourRows& neighbour : neighbours_) {
+    add_squared_misfit(neighbour);
+    add_noise(neighbour);
+  }
 }
 
 }  // namespace cmp::localmap

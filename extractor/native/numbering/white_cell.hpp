@@ -27,10 +27,18 @@ struct WhiteCellLimits {
 
   template <class F>
   static WhiteCellLimits read(const F& f) {
-    return {f["max_fit_cells"],         f["min_fit_cells"],   f["ridge"],
-            f["weight_softening"],      f["min_pivot_share"], f["max_predicted_deviation"],
-            f["max_centroid_distance"], f["min_inside"],      f["min_corner"],
-            f["max_outside"],           f["min_reach"],       f["sample_radius"],
+    return {f["max_fit_cells"],
+            f["min_fit_cells"],
+            f["ridge"],
+            f["weight_softening"],
+            f["min_pivot_share"],
+            f["max_predicted_deviation"],
+            f["max_centroid_distance"],
+            f["min_inside"],
+            f["min_corner"],
+            f["max_outside"],
+            f["min_reach"],
+            f["sample_radius"],
             f["points"]};
   }
 };

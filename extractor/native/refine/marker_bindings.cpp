@@ -10,7 +10,6 @@ namespace cmp::refine {
 
 void add_markers(nb::module_ module) {
   bind<&suspect_markers<double>>(module, "suspect_markers", {"profile_weight", "weight", "spokes", "limits"});
-  bind<&outlier_markers>(module, "outlier_markers", {"xy", "maps", "suspect", "edge", "topology", "limits"});
   bind<&correct_outliers>(module, "correct_outliers",
                           {"topology", "markers", "places", "suspect", "scale", "limits"});
   bind<&accepted_markers>(
@@ -22,8 +21,6 @@ void add_markers(nb::module_ module) {
       {"xy", "cov", "reliable", "start", "edge", "unexplained", "dot_gain", "limits"});
   bind<&update_lost_markers>(module, "update_lost_markers",
                              {"xy", "cov", "unaccepted", "predicted", "start", "edge", "limits"});
-  bind<&update_obstructed_markers>(module, "update_obstructed_markers",
-                                   {"xy", "cov", "selected", "places", "limits"});
   bind<&fill_recovered_markers>(module, "fill_recovered_markers",
                                 {"view", "state", "contrasts", "places", "topology", "markers", "limits"});
   bind<&initial_appearance>(module, "initial_appearance", {"view", "topology", "xy", "sigma", "limits"});

@@ -174,8 +174,10 @@ void update_outliers(View<const bool, 1> moving, View<const bool, 1> suspect, co
   }
 }
 
-}  // namespace
-
+// (M,), the outliers.
+//
+// xy (M, 2) px, NaN where unknown; maps (M, 2, 5), as local_maps gives them; suspect (M,); edge (M,) px, the
+// length of the edges at each marker.
 Array<bool, 1> outlier_markers(View<const double, 2> xy, View<const double, 3> maps,
                                View<const bool, 1> suspect, View<const double, 1> edge,
                                const Topology& topology, const OutlierLimits& limits) {
@@ -203,6 +205,8 @@ Array<bool, 1> outlier_markers(View<const double, 2> xy, View<const double, 3> m
   }
   return outliers;
 }
+
+}  // namespace
 
 CorrectedOutliers correct_outliers(const Topology& topology, const MeasuredMarkers& markers,
                                    const StartPlaces& places, View<const bool, 1> suspect, double scale,

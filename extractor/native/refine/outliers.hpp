@@ -74,14 +74,6 @@ Array<bool, 1> suspect_markers(View<const double, 1> profile_weight, View<const 
   return out;
 }
 
-// (M,), the outliers.
-//
-// xy (M, 2) px, NaN where unknown; maps (M, 2, 5), as local_maps gives them; suspect (M,); edge (M,) px, the
-// length of the edges at each marker.
-Array<bool, 1> outlier_markers(View<const double, 2> xy, View<const double, 3> maps,
-                               View<const bool, 1> suspect, View<const double, 1> edge,
-                               const layout::Topology& topology, const OutlierLimits& limits);
-
 // Puts the outliers where their neighbours predict them.
 //
 // The markers are px of the image reduced by scale, the places of the full image; suspect is (M,).

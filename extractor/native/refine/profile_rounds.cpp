@@ -33,8 +33,7 @@ Array<double, 1> pardoned_misfit(View<const double, 2> clearance, double toleran
 
 ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> lines,
                          const EdgeContrasts& across, const PatternState& state,
-                         const layout::Topology& topology, Index stations, bool judged,
-                         const ProfileLimits& limits) {
+                         const layout::Topology& topology, Index stations, const ProfileLimits& limits) {
   const auto contrasts = across.contrasts;
   const auto edges = topology.edges, spokes = topology.spokes, edge_cells = topology.edge_cells;
   const auto& rule = limits.rule;
@@ -43,8 +42,7 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
   ShiftGradients gradients = shift_gradients(sums);
   const double dot_gain =
       measure_dot_gain(sums, gradients, contrasts, edge_cells, state.sigma, limits.dot_gain);
-  Array<double, 1> dot_gain_offset =
-      update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
+  update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
   EliminatedBending bent = update_for_bending(
       sums, gradients, {state.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
       lines, edges, state.noise, rule, limits.step);
@@ -53,8 +51,7 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
       weigh_gridlines(sums, gradients, pardon, static_cast<double>(rule.values),
                       static_cast<double>(rule.min_places), rule.default_weight, limits.step.weights)
           .weight;
-  Array<double, 1> weight = judged ? Array<double, 1>(profile_weight.view())
-                                   : lenient_weights(profile_weight, sums, edges, spokes, limits.outliers);
+  Array<double, 1> weight = lenient_weights(profile_weight, sums, edges, spokes, limits.outliers);
   const Array<double, 2> curved = curving(topology.end_couplings, state.scatter.share, bent.response);
   const GridlineSystem system{sums,
                               weight,
@@ -66,15 +63,9 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
                               state.sigma,
                               state.noise * state.noise,
                               state.scatter.share};
-  WeighedSolution solved = solve_weighed(system, gradients, state.bend, bent.response,
-                                         {state.xy, state.hidden}, false, judged, limits.step);
-  return {std::move(profile_weight),
-          std::move(weight),
-          std::move(solved.variance_ratio),
-          std::move(bent.variance),
-          dot_gain,
-          std::move(dot_gain_offset),
-          as_tuple(std::move(solved.solution))};
+  StepSolution solved = solve_step(system, gradients, state.bend,
+                                   {topology, state.xy, state.hidden, bent.response}, limits.step);
+  return {std::move(profile_weight), std::move(weight), dot_gain, as_tuple(std::move(solved))};
 }
 
 }  // namespace cmp::refine

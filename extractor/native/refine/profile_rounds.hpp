@@ -29,18 +29,15 @@ struct ProfileLimits {
   }
 };
 
-// profile_weight, weight, variance_ratio, bend_variance, dot_gain, dot_gain_offset and solution of
-// ProfileStep.
-using ProfileStep = std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 1>, Array<double, 1>, double,
-                               Array<double, 1>, SolutionArrays>;
+// profile_weight, weight, dot_gain and solution of ProfileStep.
+using ProfileStep = std::tuple<Array<double, 1>, Array<double, 1>, double, SolutionArrays>;
 
 // The measurements of a round of profiles, and the solution.
 //
 // lines (E, 8), the gridlines; across, the contrasts across them; stations, rows of pixels across each
-// gridline at most; judged, gridlines are used by how well they look like the pattern.
+// gridline at most.
 ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> lines,
                          const EdgeContrasts& across, const PatternState& state,
-                         const layout::Topology& topology, Index stations, bool judged,
-                         const ProfileLimits& limits);
+                         const layout::Topology& topology, Index stations, const ProfileLimits& limits);
 
 }  // namespace cmp::refine

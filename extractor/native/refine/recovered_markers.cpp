@@ -114,7 +114,7 @@ Array<double, 2> shifted_markers(const GridlineSystem& system, const Information
                                  Array<double, 2> xy, const InformationLimits& limits) {
   const Array<double, 2> right = gradient(system, gradient_start, gradient_end);
   const Array<double, 2> shift =
-      solve_shifts(information.diagonal, information.off_diagonal, system.edges, right, limits);
+      solve_shifts(information.diagonal, information.off_diagonal, system.edges, right, right, limits);
   for (Index k = 0; k < xy.size(); ++k) {
     xy(k, 0) += shift(k, 0);
     xy(k, 1) += shift(k, 1);
@@ -158,12 +158,14 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
   const Array<double, 2> measured = shifted_markers(
       system, information, read.gradients.start.slice(0, count), read.gradients.end.slice(0, count),
       selected_rows(state.xy, own.markers.view()), step.information);
-  update_to_curving(information, system, step.information);
   const Array<double, 2> start = selected_rows(places.xy_px, own.markers.view());
   const Array<double, 1> edge = selected_items(places.edge_px, own.markers.view());
   const Array<bool, 1> agreed = selected_items(places.agreed, own.markers.view());
   const Array<bool, 1> is_intact = selected_items(places.is_intact, own.markers.view());
   const StartPlaces around{start, edge, agreed, is_intact};
+  update_curving(information, system,
+                 curving(selected_rows(topology.covariance_couplings, numbers), state.scatter.share,
+                         read.bend_response));
   auto [xy, cov] = accepted_markers(measured, information, read.bend_variance.slice(0, count), own.ends,
                                     own.spokes, around, asked, limits.acceptance);
   update_obstructed_markers(xy, cov, asked, around, limits.hidden);

@@ -12,6 +12,47 @@ bool has_any(View<const double, N> values) {
   return std::any_of(all.begin(), all.end(), [](double value) { return value != 0.0; });
 }
 
+// The equations of a step for the shifts of the markers.
+struct Equations {
+  const GridlineSystem& system;
+  const StepLimits& limits;
+  InformationArrays information;
+  Array<double, 2> gradient;
+
+  Equations(const GridlineSystem& of, const ShiftGradients& gradients, View<const bool, 1> hidden,
+            bool overlapping, const StepLimits& step)
+      : system(of),
+        limits(step),
+        information(fisher_information(of, prior_information(hidden, step), overlapping, step.information)),
+        gradient(refine::gradient(of, gradients.start, gradients.end)) {}
+
+  // The shifts (M, 2) px by a part of the gradient.
+  Array<double, 2> solved(View<const double, 2> part) const {
+    return solve_shifts(information.diagonal, information.off_diagonal, system.edges, part, gradient,
+                        limits.information);
+  }
+
+  // The markers after shifts (M, 2) px near the solution and what the gradients leave beside them. One more
+  // solution leaves a few hundredths of the shifts, as further ones would.
+  StepSolution solution(Array<double, 2> shift, const ShiftGradients& left, View<const double, 2> bend,
+                        const CurvedGridlines& curved) {
+    const auto lines = system.lines;
+    const auto edges = system.edges;
+    const Array<double, 2> change =
+        solved(remaining_gradient(information, edges, refine::gradient(system, left.start, left.end), shift));
+    for (Index m = 0; m < shift.size(); ++m) {
+      for (Index axis = 0; axis < 2; ++axis) shift(m, axis) += change(m, axis);
+    }
+    const Array<double, 1> least =
+        least_information(system.sums, system.weight, lines, edges, system.variance, curved.xy.size());
+    ShiftedMarkers markers =
+        markers_after_shift(curved.xy, shift, least, system.weight, system.spokes, limits.weights);
+    return {std::move(markers.measured), std::move(markers.reliable),
+            bend_after_shift(bend, curved.bend_response, shift, lines, edges, limits.bending),
+            std::move(information)};
+  }
+};
+
 }  // namespace
 
 ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::Topology& topology,
@@ -44,45 +85,30 @@ EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradi
 }
 
 StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& gradients,
-                        View<const double, 2> bend, View<const double, 2> bend_response,
-                        const DrawnMarkers& drawn, bool overlapping, const StepLimits& limits) {
-  const auto lines = system.lines;
-  const auto edges = system.edges;
-  InformationArrays information =
-      fisher_information(system, prior_information(drawn.hidden, limits), overlapping, limits.information);
-  const Array<double, 2> right = gradient(system, gradients.start, gradients.end);
-  const Array<double, 2> shift =
-      solve_shifts(information.diagonal, information.off_diagonal, edges, right, limits.information);
-  const Array<double, 1> least =
-      least_information(system.sums, system.weight, lines, edges, system.variance, drawn.xy.size());
-  ShiftedMarkers markers =
-      markers_after_shift(drawn.xy, shift, least, system.weight, system.spokes, limits.weights);
-  return {std::move(markers.measured), std::move(markers.reliable),
-          bend_after_shift(bend, bend_response, shift, lines, edges, limits.bending), std::move(information)};
+                        View<const double, 2> bend, const CurvedGridlines& curved, const StepLimits& limits) {
+  Equations equations(system, gradients, curved.hidden, false, limits);
+  Array<double, 2> shift = equations.solved(equations.gradient);
+  const CurvedGradients bent = curved_gradients(system, gradients, curved, shift, limits.gridlines);
+  return equations.solution(std::move(shift), bent.others, bend, curved);
 }
 
 WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,
-                              View<const double, 2> bend, View<const double, 2> bend_response,
-                              const DrawnMarkers& drawn, bool overlapping, bool judged,
+                              View<const double, 2> bend, const CurvedGridlines& curved,
                               const StepLimits& limits) {
-  WeighedSolution out{Array<double, 1>({system.weight.size()}, 1.0),
-                      solve_step(system, gradients, bend, bend_response, drawn, overlapping, limits)};
-  if (!judged) {
-    update_to_curving(out.solution.information, system, limits.information);
-    return out;
-  }
-  Array<double, 2> shift(drawn.xy.shape());
-  for (Index m = 0; m < shift.size(); ++m) {
-    for (Index axis = 0; axis < 2; ++axis)
-      shift(m, axis) = out.solution.measured(m, axis) - drawn.xy(m, axis);
-  }
-  out.variance_ratio = variance_ratios(system, gradients, shift, limits.disagreement);
-  Array<double, 1> weight({system.weight.size()});
-  for (Index e = 0; e < weight.size(); ++e) weight[e] = system.weight[e] / out.variance_ratio[e];
+  // that gridlines share pixels hardly changes where they disagree
+  const Equations equations(system, gradients, curved.hidden, false, limits);
+  Array<double, 2> shift = equations.solved(equations.gradient);
+  const CurvedGradients bent = curved_gradients(system, gradients, curved, shift, limits.gridlines);
+  Array<double, 1> ratio = variance_ratios(system, bent.left, shift, limits.disagreement);
+  Array<double, 1> weight({ratio.size()});
+  for (Index e = 0; e < weight.size(); ++e) weight[e] = system.weight[e] / ratio[e];
   GridlineSystem weighed = system;
   weighed.weight = weight;
-  out.solution = solve_step(weighed, gradients, bend, bend_response, drawn, overlapping, limits);
-  update_to_curving(out.solution.information, weighed, limits.information);
+  Equations judged(weighed, gradients, curved.hidden, true, limits);
+  WeighedSolution out{std::move(ratio), judged.solution(std::move(shift), bent.others, bend, curved)};
+  const Array<double, 2> of_covariance =
+      curving(curved.topology.covariance_couplings, system.scatter_share, curved.bend_response);
+  update_curving(out.solution.information, weighed, of_covariance);
   return out;
 }
 

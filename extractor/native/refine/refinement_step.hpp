@@ -8,6 +8,7 @@
 #include "layout/topology.hpp"
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/measure/gridline_weights.hpp"
+#include "refine/solve/curved_gridlines.hpp"
 #include "refine/solve/disagreement.hpp"
 #include "refine/solve/fisher_information.hpp"
 #include "refine/synthesis/gridlines.hpp"
@@ -32,10 +33,11 @@ struct StepLimits {
   BendingLimits bending;
   InformationLimits information;
   DisagreementLimits disagreement;
+  GridlineLimits gridlines;
 
   template <class F>
   static StepLimits read(const F& f) {
-    return {f["prior_px"], f["weights"], f["bending"], f["information"], f["disagreement"]};
+    return {f["prior_px"], f["weights"], f["bending"], f["information"], f["disagreement"], f["gridlines"]};
   }
 };
 
@@ -43,12 +45,6 @@ struct StepLimits {
 struct EliminatedBending {
   Array<double, 1> variance;  // (E,) px^2
   Array<double, 2> response;  // (E, 7), as update_without_bending gives it
-};
-
-// The markers as drawn.
-struct DrawnMarkers {
-  View<const double, 2> xy;    // (M, 2) px
-  View<const bool, 1> hidden;  // (M,)
 };
 
 // Markers and gridlines after a step; the arrays as in Estimate.
@@ -84,16 +80,14 @@ EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradi
 
 // Moves the markers by the shifts that the gradients ask for.
 //
-// system and gradients, bending eliminated from both; bend (E, 2) px and bend_response (E, 7), as
-// bend_after_shift takes them; overlapping, the sums include the gridlines' ends.
+// system and gradients, bending eliminated from both; bend (E, 2) px.
 StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& gradients,
-                        View<const double, 2> bend, View<const double, 2> bend_response,
-                        const DrawnMarkers& drawn, bool overlapping, const StepLimits& limits);
+                        View<const double, 2> bend, const CurvedGridlines& curved, const StepLimits& limits);
 
-// The same; where judged, once more with the gridlines' weights divided by variance_ratios, which else are 1.
+// The same for sums that include the gridlines' ends, where they share pixels, with the gridlines' weights
+// divided by their variance_ratios.
 WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,
-                              View<const double, 2> bend, View<const double, 2> bend_response,
-                              const DrawnMarkers& drawn, bool overlapping, bool judged,
+                              View<const double, 2> bend, const CurvedGridlines& curved,
                               const StepLimits& limits);
 
 SolutionArrays as_tuple(StepSolution&& solution);

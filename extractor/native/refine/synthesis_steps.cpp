@@ -5,8 +5,7 @@
 namespace cmp::refine {
 
 SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& state,
-                                  const layout::Topology& topology, bool judged,
-                                  const SynthesisLimits& limits) {
+                                  const layout::Topology& topology, const SynthesisLimits& limits) {
   const auto lines = drawing.lines, contrasts = drawing.contrasts;
   const auto edges = topology.edges, edge_cells = topology.edge_cells;
   const auto& rule = limits.rule;
@@ -30,8 +29,8 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   const Array<double, 2> curved = curving(topology.end_couplings, state.scatter.share, bent.response);
   const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,     curved,
                               edges, topology.spokes, sigma, noise * noise, state.scatter.share};
-  WeighedSolution solved = solve_weighed(system, gradients, drawing.bend, bent.response,
-                                         {state.xy, state.hidden}, true, judged, limits.step);
+  WeighedSolution solved = solve_weighed(system, gradients, drawing.bend,
+                                         {topology, state.xy, state.hidden, bent.response}, limits.step);
   return {std::move(weighed.weight),
           std::move(solved.variance_ratio),
           std::move(bent.variance),

@@ -29,9 +29,8 @@ struct SynthesisLimits {
 using SynthesisReading = std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 1>, double,
                                     Array<double, 1>, double, double, SolutionArrays>;
 
-// The measurements along the gridlines of a drawing, and the solution; where judged, their disagreement, too.
+// The measurements along the gridlines of a drawing, and the solution.
 SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& state,
-                                  const layout::Topology& topology, bool judged,
-                                  const SynthesisLimits& limits);
+                                  const layout::Topology& topology, const SynthesisLimits& limits);
 
 }  // namespace cmp::refine

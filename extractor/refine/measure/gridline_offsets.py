@@ -1,4 +1,9 @@
-"""Offsets of the gridlines at virtual markers, measured at the last comparison of the image with the pattern."""
+"""Offsets of the gridlines at virtual markers, measured at the last comparison of the image with the pattern.
+
+Rounded corners, halos and inks whose response differs shift the sides of all cells alike, by an amount that depends on
+the ink and on the place along the side: its profile. A profile is no shape of the surface, because colored cells lie on
+alternate sides of the gridlines. The median profile of each ink over the picture is removed from the offsets.
+"""
 
 from __future__ import annotations
 
@@ -11,24 +16,22 @@ from extractor._native import measure as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.refine.synthesis.pixel_rows import LIMITS as PIXEL_LIMITS
 
-NO_MODEL = np.empty((0, 0, 3), np.float32)
-
 
 class OffsetLimits(NamedTuple):
     """Limits of the offsets.
 
     Attributes:
-        clear_sigma: in units of the blur, the least distance of the next gridline where nothing was drawn. Chosen.
         min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast. Chosen.
         min_offset_weight: of a gridline, for its offsets to be measured. Chosen.
         band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
             ``PixelRowLimits``.
+        min_profile_gridlines: of an ink; with no more, its profile is taken as 0. Chosen, as for the dot gain.
     """
 
-    clear_sigma: float = 2.0
     min_weight_sum: float = 0.08
     min_offset_weight: float = 0.4
     band: float = PIXEL_LIMITS.band
+    min_profile_gridlines: int = 40
 
 
 LIMITS = OffsetLimits()
@@ -40,26 +43,22 @@ class GridlineReading(NamedTuple):
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
         sides: (E, 6), the light on both sides, as ``GridlineSides`` gives it.
-        added: (E, 6), the light to add to the drawing on both sides; the sides themselves where no pattern was drawn.
-        clearance: (E, 4), from ``gridline_clearance``; used where no pattern was drawn.
+        added: (E, 6), the light to add to the drawing on both sides.
         weight: (E,) 0 to 1.
         variance_ratio: (E,), as ``variance_ratios`` gives it.
         dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
         sigma: px, the blur.
         noise: gray levels.
-        drawn: the pattern was drawn.
     """
 
     lines: NDArray[np.float64]
     sides: NDArray[np.float64]
     added: NDArray[np.float64]
-    clearance: NDArray[np.float64]
     weight: NDArray[np.float64]
     variance_ratio: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
     sigma: float
     noise: float
-    drawn: bool
 
 
 def measure_virtual_markers(
@@ -78,5 +77,5 @@ def measure_virtual_markers(
     """
     if count == 0:
         return np.empty((len(reading.lines), 0, 3))
-    offsets = native.measure_offsets(view, model if reading.drawn else NO_MODEL, reading, count, LIMITS)
+    offsets = native.measure_offsets(view, model, reading, count, LIMITS)
     return np.asarray(native.virtual_markers(reading.lines, offsets, view.scale))

@@ -57,23 +57,15 @@ class GridlineWeightLimits(NamedTuple):
 LIMITS = GridlineWeightLimits()
 
 
-def short_edges(
-    xy: NDArray[np.float64], edges: NDArray[np.int32], rarity: int, other_rarity: int
-) -> tuple[float, float]:
-    """Two lengths, px, that all edges exceed except for one in ``rarity``, and except for one in ``other_rarity``.
+def short_edge(xy: NDArray[np.float64], edges: NDArray[np.int32], rarity: int) -> float:
+    """The length, px, that all edges exceed except for one in ``rarity``; 0 without any known edge.
 
     Args:
         xy: (M, 2) px, NaN where unknown.
         edges: (E, 2) marker ids.
-        rarity, other_rarity: the second is not greater than the first.
-
-    Returns:
-        0 and 0 without any known edge.
+        rarity: at least 1.
     """
-    shortest, usual = native.short_edges(
-        np.ascontiguousarray(xy), np.ascontiguousarray(edges), rarity, other_rarity
-    )
-    return shortest, usual
+    return float(native.short_edge(np.ascontiguousarray(xy), np.ascontiguousarray(edges), rarity))
 
 
 def median_edge(xy: NDArray[np.float64], edges: NDArray[np.int32]) -> float:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from extractor._native import solve as native
 from extractor.refine.solve.fisher_information import Information
 
-# With wide blur, the remaining share of a usual step is the square of blur over edge, times
-WIDE_BLUR_REMAINDER = 20.0
+# The remaining share of a usual step is the square of blur over edge, times
+BLUR_REMAINDER = 20.0
 
 
 class ConvergenceLimits(NamedTuple):
@@ -37,23 +37,9 @@ class ConvergenceLimits(NamedTuple):
 LIMITS = ConvergenceLimits()
 
 
-def typical_move(shift: NDArray[np.float64], information: Information) -> float:
-    """The typical move of markers in a step, in standard deviations of one axis; NaN where no marker is known.
-
-    Args:
-        shift: (M, 2) px, NaN where unknown.
-        information: about the markers.
-    """
-    x, y = shift.T
-    xx, xy, yy = information.diagonal.T
-    square = xx * x * x + 2 * xy * x * y + yy * y * y
-    known = square[square > 0]
-    middle = known.size // 2
-    return (
-        math.sqrt(0.5 * LIMITS.mean_over_median * np.partition(known, middle)[middle])
-        if known.size
-        else math.nan
-    )
+def remaining_share(sigma: float, edge_px: float) -> float:
+    """The share of a usual step that is left after the step, by blur and edge, px."""
+    return BLUR_REMAINDER * (sigma / edge_px) ** 2
 
 
 def convergence_covariance(
@@ -77,3 +63,22 @@ def convergence_covariance(
         shift, last, sigma, remaining_share, LIMITS
     )
     return covariance
+
+
+def remaining_error(covariance: NDArray[np.float64], information: Information) -> float:
+    """The remaining error, RMS of all known markers, in standard deviations of one axis; 0 where none is known.
+
+    Args:
+        covariance: (M, 2, 2) px^2, of the remaining error; NaN where unknown.
+        information: about the markers.
+    """
+    xx, xy, yy = information.diagonal.T
+    square = xx * covariance[:, 0, 0] + 2 * xy * covariance[:, 0, 1] + yy * covariance[:, 1, 1]
+    known = square[np.isfinite(square)]
+    return math.sqrt(0.5 * float(known.mean())) if known.size else 0.0
+
+
+def typical_deviation(information: Information) -> float:
+    """The deviation of one axis, px, that the information allows a typical marker; 0 without any."""
+    traces = information.diagonal[:, 0] + information.diagonal[:, 2]
+    return math.sqrt(2.0 / float(np.median(traces))) if traces.size else 0.0

@@ -25,8 +25,8 @@ class DisagreementLimits(NamedTuple):
         min_ratio: of variances, at least. Derived: it only keeps a division from failing.
         min_determinant: of a gridline's two ends, relative to the product of their sums; with less the two ends are not
             told apart, and the gridline does not count. Chosen.
-        min_block_determinant: squared gray levels per px^2, squared; the least determinant of a marker's block by which
-            is divided. Derived: it only keeps a division from failing.
+        min_block_determinant: of a marker's block, relative to its squared trace; with less, all gridlines at the
+            marker run in one direction. Derived: far above rounding.
     """
 
     tail_freedom: float = 6.0
@@ -36,7 +36,7 @@ class DisagreementLimits(NamedTuple):
     max_square: float = 1e6
     min_ratio: float = 1e-3
     min_determinant: float = 1e-6
-    min_block_determinant: float = 1e-12
+    min_block_determinant: float = 1e-9
 
 
 LIMITS = DisagreementLimits()

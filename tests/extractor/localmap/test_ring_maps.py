@@ -35,6 +35,11 @@ def seen(mm: NDArray[np.float64], gone: float) -> NDArray[np.float64]:
     return xy
 
 
+def noise_of(mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The variances of the places, px^2."""
+    return np.random.default_rng(8).uniform(0.5, 2.0, len(mm))
+
+
 @pytest.mark.parametrize("gone", [0.0, 0.2, 0.55, 0.9])
 def test_markers_are_predicted_together_as_alone(
     lattice: tuple[NDArray[np.float64], NDArray[np.int32]], gone: float
@@ -42,11 +47,12 @@ def test_markers_are_predicted_together_as_alone(
     mm, table = lattice
     xy, alone = seen(mm, gone), np.zeros(len(mm), np.bool_)
     assert len(mm) == 91  # many times as many as are solved side by side
-    together = predict_markers(xy, ~alone, mm, table)
+    noise = noise_of(mm)
+    together = predict_markers(xy, noise, ~alone, mm, table)
     for m in range(len(mm)):
         alone[:] = False
         alone[m] = True
-        for one, many in zip(predict_markers(xy, alone, mm, table), together, strict=True):
+        for one, many in zip(predict_markers(xy, noise, alone, mm, table), together, strict=True):
             assert np.array_equal(one[m], many[m], equal_nan=True)
 
 
@@ -58,7 +64,10 @@ def test_a_prediction_is_least_squares(
     """Far from the origin, as in a window of a stitched picture, too: every fit is about its own middle."""
     mm, table = lattice
     xy = seen(mm, gone) + origin_px
-    place, variance, leverage, support = predict_markers(xy, np.ones(len(mm), np.bool_), mm, table)
+    noise = noise_of(mm)
+    place, variance, leverage, by_noise, noise_around, support = predict_markers(
+        xy, noise, np.ones(len(mm), np.bool_), mm, table
+    )
     for m in np.flatnonzero(np.isfinite(place[:, 0])):
         near = [j for j in table[m] if j >= 0 and np.isfinite(xy[j, 0])]
         assert support[m] == len(near) >= FEWEST
@@ -70,7 +79,10 @@ def test_a_prediction_is_least_squares(
         left = ((rows @ terms - xy[near]) ** 2).sum() / (2 * max(len(near) - rows.shape[1], 1))
         assert place[m] == pytest.approx(terms[0], abs=1e-6)
         assert variance[m] == pytest.approx(left, abs=1e-6)
-        assert leverage[m] == pytest.approx(np.linalg.inv(rows.T @ rows)[0, 0], rel=1e-6)
+        inverse = np.linalg.inv(rows.T @ rows)
+        assert leverage[m] == pytest.approx(inverse[0, 0], rel=1e-6)
+        assert by_noise[m] == pytest.approx((inverse[0] @ rows.T) ** 2 @ noise[near], rel=1e-6)
+        assert noise_around[m] == pytest.approx(noise[near].mean())
 
 
 def test_quadratics_through_too_few_or_repeated_points_are_refused(
@@ -78,19 +90,19 @@ def test_quadratics_through_too_few_or_repeated_points_are_refused(
 ) -> None:
     """Neighbours in any number, on one line, and all on one point."""
     mm, table = lattice
-    wanted = np.zeros(len(mm), np.bool_)
+    wanted, exact = np.zeros(len(mm), np.bool_), np.zeros(len(mm))
     wanted[0] = True
     for known in range(19):
         xy = np.full_like(mm, np.nan)
         xy[table[0, :known]] = 20.0 * mm[table[0, :known]]
-        place = predict_markers(xy, wanted, mm, table)[0][0]
+        place = predict_markers(xy, exact, wanted, mm, table)[0][0]
         assert np.isnan(place).all() or np.abs(place - 20.0 * mm[0]).max() < 1e-6
         assert known >= 4 or np.isnan(place).all()
     line = np.abs(mm[table[0], 1]) < 1e-9
     assert line.sum() >= 4
     xy = np.full_like(mm, np.nan)
     xy[table[0][line]] = mm[table[0][line]]
-    assert np.isnan(predict_markers(xy, wanted, mm, table)[0]).all()
+    assert np.isnan(predict_markers(xy, exact, wanted, mm, table)[0]).all()
     repeated = np.repeat(table[:, :1], table.shape[1], axis=1)
-    assert np.isnan(predict_markers(20.0 * mm, wanted, mm, repeated)[0]).all()
-    assert np.isfinite(predict_markers(np.full_like(mm, 7.0), wanted, mm, table)[0][0]).all()
+    assert np.isnan(predict_markers(20.0 * mm, exact, wanted, mm, repeated)[0]).all()
+    assert np.isfinite(predict_markers(np.full_like(mm, 7.0), exact, wanted, mm, table)[0][0]).all()

@@ -73,7 +73,7 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("preset", "limit"), [("fast", 2.4), ("balanced", 1.4), ("accurate", 1.15)])
+@pytest.mark.parametrize(("preset", "limit"), [("fast", 1.6), ("balanced", 1.4), ("accurate", 1.15)])
 @pytest.mark.parametrize(("pattern", "bent", "blur"), CASES)
 def test_the_error_is_near_the_exact_bound(
     preset: str, limit: float, pattern: str, bent: str, blur: float
@@ -83,7 +83,8 @@ def test_the_error_is_near_the_exact_bound(
     assert np.sqrt(np.mean(error**2)) < limit * rms_bound(pattern, bent, blur)
     if preset != "fast":
         found = summarise([squared_distances(*one) for one in zip(error, covariance, strict=True)])
-        assert 0.85 < found.z.value < (1.13 if blur < 3 else 1.3)
+        # the misfit of the first drawing counts where no second one is needed
+        assert 0.8 < found.z.value < (1.13 if blur < 3 else 1.3)
 
 
 @pytest.mark.parametrize(("blur", "limit"), [(0.6, 0.002), (1.0, 0.003), (2.0, 0.013), (3.0, 0.013)])

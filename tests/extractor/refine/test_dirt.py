@@ -125,4 +125,5 @@ def test_a_cut_view_with_dirt_is_read(pattern: str) -> None:
     deep = found & ((markers.xy_px > 24) & (markers.xy_px < np.array(seen.image.shape[1::-1]) - 24)).all(
         axis=1
     )
-    assert errors_px(markers, seen)[found].max() < 1.6 and deviations(markers, seen)[deep].max() < 5.0
+    assert errors_px(markers, seen)[found].max() < 2.5  # half of the cell at the image's corner is outside
+    assert deviations(markers, seen)[deep].max() < 5.0 and deviations(markers, seen)[found].max() < 6.0

@@ -15,7 +15,7 @@ void add_measure(nb::module_ module) {
                          {"xy", "maps", "diagonal", "topology", "by_synthesis", "limits"});
   bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count", "limits"});
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
-  bind<&short_edges>(module, "short_edges", {"xy", "edges", "rarity", "other_rarity"});
+  bind<&short_edge>(module, "short_edge", {"xy", "edges", "rarity"});
   bind<&median_edge>(module, "median_edge", {"xy", "edges", "limits"});
   bind<&pattern_box>(module, "pattern_box", {"xy", "margin", "width", "height"});
 }

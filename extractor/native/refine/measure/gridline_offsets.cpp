@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "numeric/median.hpp"
 #include "refine/measure/matched_filter.hpp"
 #include "refine/measure/station_pixels.hpp"
 #include "refine/synthesis/gridline_sides.hpp"
@@ -15,7 +16,7 @@ namespace cmp::refine {
 
 namespace {
 
-constexpr Index OFFSET = 0, VARIANCE = 1;
+constexpr Index OFFSET = 0, VARIANCE = 1, COLORS = 3;
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 
 // Memory for the pixels of one gridline.
@@ -29,16 +30,6 @@ struct OffsetBuffers {
 struct StationTotal {
   double residual, information;
 };
-
-// Whether the gridlines at both ends of gridline e keep clear of one of its stations.
-bool is_clear(const GridlineReading& reading, Index e, Index station, Index count,
-              const OffsetLimits& limits) {
-  const auto own = static_cast<double>(station), all = static_cast<double>(count);
-  const double from_start = (own + 0.5) / (all + 1.0), from_end = (all - own - 0.5) / (all + 1.0);
-  const double start = from_start * reading.clearance(e, SINE_A),
-               end = from_end * reading.clearance(e, SINE_B);
-  return !(reading.lines(e, LENGTH) * std::min(start, end) < limits.clear_sigma * reading.sigma);
-}
 
 // The gridlines that are measured, and what they are compared with.
 struct Comparison {
@@ -81,6 +72,43 @@ void fill_station_sums(const Comparison& compared, Index e, OffsetBuffers& buffe
   }
 }
 
+// The color in which gridline e has the largest contrast (3,), and 1 or -1 by the side that is brighter.
+struct InkSide {
+  Index color;
+  double outward;
+
+  explicit InkSide(View<const double, 1> contrast) : color(0) {
+    for (Index k = 1; k < COLORS; ++k) {
+      if (std::abs(contrast[k]) > std::abs(contrast[color])) color = k;
+    }
+    outward = contrast[0] + contrast[1] + contrast[2] > 0.0 ? 1.0 : -1.0;
+  }
+};
+
+// Removes from the offsets (E, count, 2) the median outward offset of all gridlines of an ink at each
+// station.
+void update_without_profiles(View<double, 3> offsets, View<const double, 2> contrasts,
+                             const OffsetLimits& limits) {
+  Array<double, 1> outward({offsets.size()});
+  Array<std::int64_t, 1> gridlines({offsets.size()});
+  for (Index color = 0; color < COLORS; ++color) {
+    for (Index j = 0; j < offsets.size(1); ++j) {
+      Index count = 0;
+      for (Index e = 0; e < offsets.size(); ++e) {
+        const InkSide ink(contrasts[e]);
+        if (ink.color != color || std::isnan(offsets(e, j, OFFSET))) continue;
+        outward[count] = ink.outward * offsets(e, j, OFFSET);
+        gridlines[count++] = e;
+      }
+      if (count <= limits.min_profile_gridlines) continue;
+      const double profile = numeric::median_of_many(outward.slice(0, count));
+      for (const Index e : gridlines.first(count)) {
+        offsets(e, j, OFFSET) -= InkSide(contrasts[e]).outward * profile;
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const float, 3> model,
@@ -103,13 +131,13 @@ Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const flo
     fill_station_sums(compared, e, *buffers, sums);
     for (Index j = 0; j < count; ++j) {
       const auto [residual, information] = sums[static_cast<std::size_t>(j)];
-      const bool clear = reading.drawn || is_clear(reading, e, j, count, limits);
-      if (information < limits.min_weight_sum * strength || !clear) continue;
+      if (information < limits.min_weight_sum * strength) continue;
       const double variance = reading.variance_ratio[e] * (reading.noise * reading.noise);
       out(e, j, OFFSET) = reading.sigma * residual / information - reading.dot_gain_offset[e];
       out(e, j, VARIANCE) = variance * (reading.sigma * reading.sigma) / information;
     }
   }
+  update_without_profiles(out, contrasts, limits);
   return out;
 }
 

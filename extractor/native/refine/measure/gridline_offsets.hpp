@@ -9,40 +9,38 @@ namespace cmp::refine {
 
 // Limits of the offsets; explained in extractor/refine/measure/gridline_offsets.py.
 struct OffsetLimits {
-  double clear_sigma, min_weight_sum, min_offset_weight, band;
+  double min_weight_sum, min_offset_weight, band;
+  Index min_profile_gridlines;
 
   template <class F>
   static OffsetLimits read(const F& f) {
-    return {f["clear_sigma"], f["min_weight_sum"], f["min_offset_weight"], f["band"]};
+    return {f["min_weight_sum"], f["min_offset_weight"], f["band"], f["min_profile_gridlines"]};
   }
 };
 
 // The gridlines and the levels beside them, where refinement last compared the image with the pattern.
 struct GridlineReading {
-  View<const double, 2> lines;      // (E, 8), as gridlines gives them
-  View<const double, 2> sides;      // (E, 6), the light on both sides, as GridlineSides gives it
-  View<const double, 2> added;      // (E, 6), the light to add to the drawing; the sides where none was drawn
-  View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it; used where no pattern was drawn
-  View<const double, 1> weight;     // (E,) 0 to 1
+  View<const double, 2> lines;            // (E, 8), as gridlines gives them
+  View<const double, 2> sides;            // (E, 6), the light on both sides, as GridlineSides gives it
+  View<const double, 2> added;            // (E, 6), the light to add to the drawing
+  View<const double, 1> weight;           // (E,) 0 to 1
   View<const double, 1> variance_ratio;   // (E,), as variance_ratios gives it
   View<const double, 1> dot_gain_offset;  // (E,) px, the shift of the gridline towards (-uy, ux) by dot gain
   double sigma;                           // px, the blur
   double noise;                           // gray levels
-  bool drawn;                             // the pattern was drawn
 
   template <class F>
   static GridlineReading read(const F& f) {
-    return {f["lines"],          f["sides"],           f["added"], f["clearance"], f["weight"],
-            f["variance_ratio"], f["dot_gain_offset"], f["sigma"], f["noise"],     f["drawn"]};
+    return {f["lines"],          f["sides"],           f["added"], f["weight"],
+            f["variance_ratio"], f["dot_gain_offset"], f["sigma"], f["noise"]};
   }
 };
 
 // The offsets of the gridlines around their virtual markers, count of each gridline.
 //
-// model (H, W, 3), the light of the drawn pattern; empty where no pattern was drawn.
-// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain; px^2, its variance. NaN where the
-// gridline has no contrast or little weight or leaves the image, or where another gridline is near what was
-// not drawn.
+// model (H, W, 3), the light of the drawn pattern.
+// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain and of the ink's profile; px^2, its
+// variance. NaN where the gridline has no contrast or little weight or leaves the image.
 Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const float, 3> model,
                                  const GridlineReading& reading, Index count, const OffsetLimits& limits);
 

@@ -121,8 +121,7 @@ Array<bool, 1> well_weighted_markers(View<const double, 1> weight, View<const st
   return out;
 }
 
-std::tuple<double, double> short_edges(View<const double, 2> xy, View<const std::int32_t, 2> edges,
-                                       Index rarity, Index other_rarity) {
+double short_edge(View<const double, 2> xy, View<const std::int32_t, 2> edges, Index rarity) {
   Array<double, 1> squares({edges.size()});
   const auto own_squares = squares.view();
   Index count = 0;
@@ -132,16 +131,12 @@ std::tuple<double, double> short_edges(View<const double, 2> xy, View<const std:
     own_squares[count] = dx * dx + dy * dy;
     count += std::isfinite(own_squares[count]);  // an unknown one is overwritten
   }
-  if (count == 0) return {0.0, 0.0};
-  const Index few = count / rarity, some = count / other_rarity;
-  const double usual = numeric::select(squares.slice(0, count), some);
-  const double shortest = few == some ? usual : numeric::select(squares.slice(0, some + 1), few);
-  return {std::sqrt(shortest), std::sqrt(usual)};
+  return count == 0 ? 0.0 : std::sqrt(numeric::select(squares.slice(0, count), count / rarity));
 }
 
 double median_edge(View<const double, 2> xy, View<const std::int32_t, 2> edges,
                    const GridlineWeightLimits& limits) {
-  return std::max(std::get<1>(short_edges(xy, edges, 2, 2)), limits.min_edge_px);
+  return std::max(short_edge(xy, edges, 2), limits.min_edge_px);
 }
 
 double blur_change(View<const double, 2> sums, View<const double, 1> gridline_weight,

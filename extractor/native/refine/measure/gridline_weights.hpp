@@ -84,11 +84,10 @@ GridlineWeights weigh_gridlines(View<const double, 2> sums, const ShiftGradients
 Array<bool, 1> well_weighted_markers(View<const double, 1> weight, View<const std::int32_t, 2> spokes,
                                      const GridlineWeightLimits& limits);
 
-// Two lengths, px, that all edges exceed except for one in `rarity`, and except for one in `other_rarity`.
+// The length, px, that all edges exceed except for one in `rarity`; 0 without any known edge.
 //
-// xy (M, 2) px; edges (E, 2); other_rarity is not greater than rarity. 0 and 0 without any known edge.
-std::tuple<double, double> short_edges(View<const double, 2> xy, View<const std::int32_t, 2> edges,
-                                       Index rarity, Index other_rarity);
+// xy (M, 2) px; edges (E, 2).
+double short_edge(View<const double, 2> xy, View<const std::int32_t, 2> edges, Index rarity);
 
 // The median length of the edges (E, 2), px; limits.min_edge_px without any.
 double median_edge(View<const double, 2> xy, View<const std::int32_t, 2> edges,

@@ -9,7 +9,8 @@ namespace cmp::refine {
 void add_solve(nb::module_ module) {
   bind<&convergence_covariance>(module, "convergence_covariance",
                                 {"shift", "last", "sigma", "remaining_share", "limits"});
-  bind<&solve_shifts>(module, "solve_shifts", {"diagonal", "off_diagonal", "edges", "right", "limits"});
+  bind<&solve_shifts>(module, "solve_shifts",
+                      {"diagonal", "off_diagonal", "edges", "right", "whole", "limits"});
   bind<&covariances>(
       module, "covariances",
       {"diagonal", "off_diagonal", "edges", "spokes", "min_information", "selected", "limits"});

@@ -82,9 +82,11 @@ Array<double, 1> degrees_of_freedom(const GridlineSystem& system, const Disagree
     for (Index side = 0; side < 2; ++side) {
       const Index m = edges(e, side);
       const double value = known * sums.at(side), xx = blocks(m, 0), cross = blocks(m, 1), yy = blocks(m, 2);
-      const double determinant = xx * yy - cross * cross;
-      const double share = (yy * nx * nx - 2.0 * cross * nx * ny + xx * ny * ny) * value /
-                           std::max(determinant, limits.min_block_determinant);
+      const double determinant = xx * yy - cross * cross, trace = xx + yy;
+      // gridlines in one direction tell one unknown
+      const double share = determinant > limits.min_block_determinant * trace * trace
+                               ? (yy * nx * nx - 2.0 * cross * nx * ny + xx * ny * ny) * value / determinant
+                               : value / trace;
       freedom -= std::min(share, 1.0);
     }
     out[e] = std::max(freedom, limits.min_freedom);

@@ -81,7 +81,7 @@ Array<std::int64_t, 1> known_markers(View<const double, 2> diagonal, double min_
 }
 
 // Adds the sums of gridline e, times factors for its start, its end and the two with each other.
-void add_gridline(const GridlineSystem& system, Index e, double start, double end, double between,
+void add_gridline(const GridlineSystem& system, Index e, const std::array<double, COUPLINGS>& factors,
                   View<double, 2> diagonal, View<double, 2> off_diagonal) {
   const auto lines = system.lines[e], sums = system.sums[e];
   const double w = system.weight[e] * lines[KNOWN] / system.variance;
@@ -89,13 +89,13 @@ void add_gridline(const GridlineSystem& system, Index e, double start, double en
   const double nx = -lines[UY], ny = lines[UX];
   for (Index side = 0; side < 2; ++side) {
     const auto block = diagonal[system.edges(e, side)];
-    const double value = w * (side == 0 ? start * sums[AA] : end * sums[BB]);
+    const double value = w * factors[side] * (side == 0 ? sums[AA] : sums[BB]);
     block[0] += value * nx * nx;
     block[1] += value * nx * ny;
     block[2] += value * ny * ny;
   }
   const auto block = off_diagonal[e];
-  const double value = w * between * sums[AB];
+  const double value = w * factors[BETWEEN] * sums[AB];
   block[0] += value * nx * nx;
   block[1] += value * nx * ny;
   block[2] += value * ny * nx;
@@ -127,19 +127,19 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     diagonal(m, 0) = diagonal(m, 2) = prior[m];
     diagonal(m, 1) = 0.0;
   }
-  const double coupling = limits.step_coupling * (1.0 - system.scatter_share);
-  for (Index e = 0; e < edges.size(); ++e)
-    add_gridline(system, e, 1.0 + coupling, 1.0 + coupling, 1.0 - coupling, diagonal, off_diagonal);
+  for (Index e = 0; e < edges.size(); ++e) {
+    const auto own = system.curving[e];
+    add_gridline(system, e, {1.0 + own[0], 1.0 + own[1], 1.0 + own[BETWEEN]}, diagonal, off_diagonal);
+  }
   if (overlapping) add_shared_pixels(system, diagonal, off_diagonal, limits.shared);
   return out;
 }
 
-void update_to_curving(InformationArrays& information, const GridlineSystem& system,
-                       const InformationLimits& limits) {
-  const double coupling = limits.step_coupling * (1.0 - system.scatter_share);
+void update_curving(InformationArrays& information, const GridlineSystem& system,
+                    View<const double, 2> curving) {
   for (Index e = 0; e < system.edges.size(); ++e) {
-    const auto own = system.curving[e];
-    add_gridline(system, e, own[0] - coupling, own[1] - coupling, own[BETWEEN] + coupling,
+    const auto own = system.curving[e], other = curving[e];
+    add_gridline(system, e, {other[0] - own[0], other[1] - own[1], other[BETWEEN] - own[BETWEEN]},
                  information.diagonal, information.off_diagonal);
   }
 }
@@ -164,19 +164,29 @@ Array<double, 2> gradient(const GridlineSystem& system, View<const double, 1> gr
   return out;
 }
 
+Array<double, 2> remaining_gradient(const Information& information, View<const std::int32_t, 2> edges,
+                                    View<const double, 2> gradient, View<const double, 2> shift) {
+  Array<double, 2> out(gradient.shape());
+  fill_product(information.diagonal, information.off_diagonal, edges, shift, out);
+  for (Index m = 0; m < out.size(); ++m) {
+    for (Index axis = 0; axis < 2; ++axis) out(m, axis) = gradient(m, axis) - out(m, axis);
+  }
+  return out;
+}
+
 Array<double, 2> solve_shifts(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
                               View<const std::int32_t, 2> edges, View<const double, 2> right,
-                              const InformationLimits& limits) {
+                              View<const double, 2> whole, const InformationLimits& limits) {
   const Index count = diagonal.size();
   const Array<double, 2> inverse = inverse_blocks(diagonal);
   Array<double, 2> residuals(right), shifts({count, 2}, 0.0), searches({count, 2}, 0.0);
   Array<double, 2> products({count, 2}), descents({count, 2});
   const auto residual = residuals.view(), shift = shifts.view(), search = searches.view();
   const auto product = products.view(), descent = descents.view();
-  double before = 1.0, start = 0.0;
+  const double start = fill_descent(inverse, whole, descent);
+  double before = 1.0;
   for (Index step = 0; step < limits.max_steps; ++step) {
     const double now = fill_descent(inverse, residual, descent);
-    if (step == 0) start = now;
     if (!(now > limits.precision * limits.precision * start)) break;
     const double blend = step > 0 ? now / before : 0.0;
     for (Index m = 0; m < count; ++m) {

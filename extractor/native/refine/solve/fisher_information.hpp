@@ -40,15 +40,14 @@ struct GridlineSystem {
 
 // Limits of the information; explained in extractor/refine/solve/fisher_information.py.
 struct InformationLimits {
-  double step_coupling, held_information;
+  double held_information;
   Index max_steps;
   double precision, min_determinant;
   SharedPixelLimits shared;
 
   template <class F>
   static InformationLimits read(const F& f) {
-    return {f["step_coupling"], f["held_information"], f["max_steps"],
-            f["precision"],     f["min_determinant"],  f["shared"]};
+    return {f["held_information"], f["max_steps"], f["precision"], f["min_determinant"], f["shared"]};
   }
 };
 
@@ -60,16 +59,16 @@ struct InformationLimits {
 Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
                          View<const double, 2> bend_response);
 
-// The information about the markers, as a step uses it: every gridline curves as inside the pattern.
+// The information about the markers, with gridlines that curve with their own two ends.
 //
 // prior (M,) 1/px^2, before the measurement; overlapping, the sums include the gridlines' ends, where
 // gridlines share their pixels.
 InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
                                      bool overlapping, const InformationLimits& limits);
 
-// Changes the information of a step to that of gridlines that curve as the system says, for covariances.
-void update_to_curving(InformationArrays& information, const GridlineSystem& system,
-                       const InformationLimits& limits);
+// Changes the information to that of gridlines with this curving (E, 3) in the place of the system's.
+void update_curving(InformationArrays& information, const GridlineSystem& system,
+                    View<const double, 2> curving);
 
 // (M, 2) 1/px, the gradient of the log-likelihood at each marker.
 //
@@ -77,14 +76,18 @@ void update_to_curving(InformationArrays& information, const GridlineSystem& sys
 Array<double, 2> gradient(const GridlineSystem& system, View<const double, 1> gradient_start,
                           View<const double, 1> gradient_end);
 
+// (M, 2) 1/px, what the shifts (M, 2) px leave of the gradient (M, 2) 1/px.
+Array<double, 2> remaining_gradient(const Information& information, View<const std::int32_t, 2> edges,
+                                    View<const double, 2> gradient, View<const double, 2> shift);
+
 // (M, 2) px, the shifts of the markers, by conjugate gradients preconditioned with the diagonal blocks.
 //
 // The descent ends early where the whole matrix is not positive definite. diagonal (M, 3) positive definite
 // blocks and off_diagonal (E, 4), 1/px^2; edges (E, 2), the markers that each off-diagonal block joins; right
-// (M, 2) 1/px, the gradient.
+// (M, 2) 1/px, the gradient; whole (M, 2) 1/px, the gradient relative to which the solution is precise.
 Array<double, 2> solve_shifts(View<const double, 2> diagonal, View<const double, 2> off_diagonal,
                               View<const std::int32_t, 2> edges, View<const double, 2> right,
-                              const InformationLimits& limits);
+                              View<const double, 2> whole, const InformationLimits& limits);
 
 // (M, 2, 2) px^2, the markers' covariances: diagonal blocks of the inverse, from each marker and its
 // neighbours; NaN where nothing is known and where not selected.
