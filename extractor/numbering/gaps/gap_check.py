@@ -38,8 +38,8 @@ class GapCheckLimits(NamedTuple):
         min_white_cell_neighbours: least number of them. Measured: rule "white contradicted".
         max_white_cell_misfit: in cells, the median distance from the predictions; a wrong step makes 1.7. Measured:
             rule "white contradicted".
-        max_contact_jump: of a contact against the slope by the other contacts of either cell, in cells; larger ones join
-            no two large blocks. Measured: rule "even contacts".
+        max_contact_jump: of a contact against the slope by the other contacts of either cell, in cells; larger ones
+            join no two large blocks. Measured: rule "even contacts".
         min_block_cells, min_block_share: of a large block, and as a share of the numbered cells: contacts that no third
             cell confirms join it to no other such one. Measured: rule "firm contacts".
         contact: of the cells' contacts and maps.
