@@ -19,8 +19,7 @@ from extractor.localmap.cell_prediction import LIMITS as PREDICTION_LIMITS
 from extractor.localmap.cell_prediction import CellPredictionLimits, lattice_bases
 from extractor.numbering.white_cell import LIMITS as WHITE_CELL_LIMITS
 from extractor.numbering.white_cell import WhiteCellLayout, WhiteCellLimits
-from extractor.numbering.whiteness import LIMITS as WHITENESS_LIMITS
-from extractor.numbering.whiteness import WhitenessLimits, measure_inks
+from extractor.numbering.whiteness import measure_inks
 
 
 class WhiteSearchLimits(NamedTuple):
@@ -30,27 +29,17 @@ class WhiteSearchLimits(NamedTuple):
 
     Attributes:
         min_white_ratio: brightness of white; blurred black stays below 0.5, dim white is brighter than any ink. Chosen.
-        max_black_ratio: brightness between the inks: black is darker than the inks even in haze, other images are not.
-            Measured: rule "dark between inks".
-        min_black_share: of the places between three cells; the white cell and glare are among these places. Measured:
-            rule "dark between inks".
-        min_enclosed_places: such places; if fewer, places next to one or two cells count, too. Measured: rule "dark
-            between inks".
         max_white_candidates: places tried in a ring, the brightest. Chosen.
         min_weakest_channel: least whiteness. Chosen.
         min_weakest_channel_far: the same where no walked cell touches the place. Chosen.
-        cell, whiteness, prediction: of the modules that do these steps.
+        cell, prediction: of the modules that do these steps.
     """
 
     min_white_ratio: float = 0.75
-    max_black_ratio: float = 0.95
-    min_black_share: float = 0.8
-    min_enclosed_places: int = 6
     max_white_candidates: int = 16
     min_weakest_channel: float = 0.5
     min_weakest_channel_far: float = 0.75
     cell: WhiteCellLimits = WHITE_CELL_LIMITS
-    whiteness: WhitenessLimits = WHITENESS_LIMITS
     prediction: CellPredictionLimits = PREDICTION_LIMITS
 
 

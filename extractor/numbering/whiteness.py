@@ -2,7 +2,7 @@
 
 The brightness is the sum of the channels, relative to that of the inks around. In light of any color, each channel of
 white is about as strong as in the ink with most of that channel; colored dirt has a weaker channel. The whiteness is
-the weakest of these ratios, 0 for colored places.
+the weakest of these ratios.
 """
 
 from __future__ import annotations
@@ -20,12 +20,9 @@ class WhitenessLimits(NamedTuple):
     """Limits of whiteness.
 
     Attributes:
-        min_channel_balance: of the weakest ratio to the strongest, for places that are not colored. Measured: rule
-            "channel balance".
         sample_radius: of a color sample, relative to the square root of the cell's area. Chosen.
     """
 
-    min_channel_balance: float = 0.4
     sample_radius: float = 0.1
 
 

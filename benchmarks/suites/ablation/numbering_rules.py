@@ -62,14 +62,6 @@ NUMBERING = (
         "ring < 1",
     ),
     Rule(
-        "dark between inks",
-        "between the inks the pattern is black",
-        "no wrong id",
-        "extractor/numbering/white_search.py",
-        "min_black_share: float = 0.8",
-        "min_black_share: float = 0.0",
-    ),
-    Rule(
         "white triangle",
         "the white cell fills its triangle and ends with it",
         "no wrong id",
@@ -84,14 +76,6 @@ NUMBERING = (
         "extractor/numbering/white_cell.py",
         "max_centroid_distance: float = 0.3",
         "max_centroid_distance: float = 0.0",
-    ),
-    Rule(
-        "channel balance",
-        "a place with a weak channel is colored, not white",
-        "no wrong id",
-        "extractor/numbering/whiteness.py",
-        "min_channel_balance: float = 0.4",
-        "min_channel_balance: float = 0.0",
     ),
 )
 
@@ -141,8 +125,16 @@ GAPS = (
         "large blocks of cells are not joined by contacts that no third cell confirms",
         "no wrong id",
         "extractor/native/numbering/gaps/gap_check.cpp",
-        "blocks_of(neighbours, selected, limits)",
+        "blocks_of(contacts, cell, neighbours, selected, limits)",
         "connected_components(neighbours, selected)",
+    ),
+    Rule(
+        "even contacts",
+        "nor by contacts that lie farther off than the cells around predict",
+        "no wrong id",
+        "extractor/numbering/gaps/gap_check.py",
+        "max_contact_jump: float = 0.5",
+        "max_contact_jump: float = 100.0",
     ),
     Rule(
         "single cells",

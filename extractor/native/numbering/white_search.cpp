@@ -25,20 +25,6 @@ Array<double, 1> black_color(View<const double, 2> color, View<const std::int64_
   return black;
 }
 
-// Whether the places between the inks are dark, as in the pattern; places outside the pattern do not count.
-bool is_dark_between_inks(View<const double, 1> brightness, View<const std::int64_t, 1> support_count,
-                          const WhiteSearchLimits& limits) {
-  const Index enclosed = std::count(support_count.begin(), support_count.end(), ENCLOSING_CELLS);
-  const bool use_all = enclosed < limits.min_enclosed_places;
-  Index between = 0, dark = 0;
-  for (Index i = 0; i < support_count.size(); ++i)
-    if (use_all || support_count[i] == ENCLOSING_CELLS) {
-      ++between;
-      dark += brightness[i] < limits.max_black_ratio;
-    }
-  return between > 0 && static_cast<double>(dark) / static_cast<double>(between) >= limits.min_black_share;
-}
-
 // The bright places of at least this whiteness, the brightest first.
 Array<Index, 1> select_brightest(const PlaceColors& shown, double least_whiteness,
                                  const WhiteSearchLimits& limits) {
@@ -137,9 +123,9 @@ WhiteCandidates search_white_cell(View<const std::uint8_t, 3> image, View<const 
     if (ring == 1)
       localmap::update_excluded_misfits(grid, axial, known.cells, layout.layers, limits.prediction);
     const auto places = localmap::predicted_places(center, known, grid, ring, limits.prediction);
-    const auto shown = measure_whiteness(image, places.means, inks.strongest, is_far, limits.whiteness);
+    const auto shown = measure_whiteness(image, places.means, inks.strongest, is_far);
     if (!is_far) {
-      if (!is_dark_between_inks(shown.brightness, places.support_count, limits)) break;
+      if (places.axial.size() == 0) break;
       black = black_color(shown.color, places.support_count);
       localmap::update_excluded_places(grid, enclosed_places(places));
     }

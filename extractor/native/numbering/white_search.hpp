@@ -12,24 +12,19 @@ namespace cmp::numbering {
 
 // Limits of the search; explained in extractor/numbering/white_search.py.
 struct WhiteSearchLimits {
-  double min_white_ratio, max_black_ratio, min_black_share;
-  Index min_enclosed_places, max_white_candidates;
+  double min_white_ratio;
+  Index max_white_candidates;
   double min_weakest_channel, min_weakest_channel_far;
   WhiteCellLimits cell;
-  WhitenessLimits whiteness;
   localmap::CellPredictionLimits prediction;
 
   template <class F>
   static WhiteSearchLimits read(const F& f) {
     return {f["min_white_ratio"],
-            f["max_black_ratio"],
-            f["min_black_share"],
-            f["min_enclosed_places"],
             f["max_white_candidates"],
             f["min_weakest_channel"],
             f["min_weakest_channel_far"],
             f["cell"],
-            f["whiteness"],
             f["prediction"]};
   }
 };

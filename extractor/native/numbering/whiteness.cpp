@@ -27,18 +27,16 @@ struct Shade {
 
 // The brightness of patch n relative to the inks around, and its whiteness; writes its color (3,).
 Shade fill_patch_color(View<const double, 1> patches, Index n, double level, View<const double, 1> strongest,
-                       bool is_far, double min_balance, View<double, 1> color) {
+                       bool is_far, View<double, 1> color) {
   if (!(patches[INSIDE + n] > 0.0)) return {0.0, 0.0};
-  double total = 0.0, weakest = std::numeric_limits<double>::infinity(), most = 0.0;
+  double total = 0.0, weakest = std::numeric_limits<double>::infinity();
   for (int channel = 0; channel < CHANNELS; ++channel) {
     color[channel] = patches[COLOR + channel * BATCH_POINTS + n];
     const double share = color[channel] / std::max(strongest[channel], ONE_STEP);
     total += color[channel];
     weakest = std::min(weakest, share);
-    most = std::max(most, share);
   }
-  const double white = weakest > min_balance * most ? weakest : 0.0;
-  return {is_far ? white : total / std::max(level, ONE_STEP), white};
+  return {is_far ? weakest : total / std::max(level, ONE_STEP), weakest};
 }
 
 }  // namespace
@@ -87,7 +85,7 @@ std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 2>, Array<double, 1
 }
 
 PlaceColors measure_whiteness(View<const std::uint8_t, 3> image, View<const double, 2> means,
-                              View<const double, 1> strongest, bool is_far, const WhitenessLimits& limits) {
+                              View<const double, 1> strongest, bool is_far) {
   const Index count = means.size();
   PlaceColors out{Array<double, 1>({count}), Array<double, 1>({count}),
                   Array<double, 2>({count, CHANNELS}, 0.0)};
@@ -103,8 +101,8 @@ PlaceColors measure_whiteness(View<const std::uint8_t, 3> image, View<const doub
     }
     numeric::fill_patch_means(image.flat(), image.size(0), image.size(1), here, buffers);
     for (Index n = 0; n < here; ++n) {
-      const Shade shade = fill_patch_color(patches, n, means(first + n, 3), strongest, is_far,
-                                           limits.min_channel_balance, out.color[first + n]);
+      const Shade shade =
+          fill_patch_color(patches, n, means(first + n, 3), strongest, is_far, out.color[first + n]);
       out.brightness[first + n] = shade.brightness;
       out.whiteness[first + n] = shade.whiteness;
     }

@@ -9,11 +9,11 @@ namespace cmp::numbering {
 
 // Limits of whiteness; explained in extractor/numbering/whiteness.py.
 struct WhitenessLimits {
-  double min_channel_balance, sample_radius;
+  double sample_radius;
 
   template <class F>
   static WhitenessLimits read(const F& f) {
-    return {f["min_channel_balance"], f["sample_radius"]};
+    return {f["sample_radius"]};
   }
 };
 
@@ -32,7 +32,7 @@ struct InkColors {
 // The colors of P predicted places.
 struct PlaceColors {
   Array<double, 1> brightness;  // (P,) relative to the inks
-  Array<double, 1> whiteness;   // (P,) 0 for colored places
+  Array<double, 1> whiteness;   // (P,) the weakest channel, relative to the strongest ink of that channel
   Array<double, 2> color;       // (P, 3) BGR, 0 outside the image
 };
 
@@ -51,6 +51,6 @@ std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 2>, Array<double, 1
 // image (H, W, 3) BGR without gaps; means (P, 4) of the predicted places; strongest (3,) of the inks;
 // is_far, no known cell touches the places.
 PlaceColors measure_whiteness(View<const std::uint8_t, 3> image, View<const double, 2> means,
-                              View<const double, 1> strongest, bool is_far, const WhitenessLimits& limits);
+                              View<const double, 1> strongest, bool is_far);
 
 }  // namespace cmp::numbering

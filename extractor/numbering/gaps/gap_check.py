@@ -38,6 +38,8 @@ class GapCheckLimits(NamedTuple):
         min_white_cell_neighbours: least number of them. Measured: rule "white contradicted".
         max_white_cell_misfit: in cells, the median distance from the predictions; a wrong step makes 1.7. Measured:
             rule "white contradicted".
+        max_contact_jump: of a contact against the slope by the other contacts of either cell, in cells; larger ones
+            join no two large blocks. Measured: rule "even contacts".
         min_block_cells, min_block_share: of a large block, and as a share of the numbered cells: contacts that no third
             cell confirms join it to no other such one. Measured: rule "firm contacts".
         contact: of the cells' contacts and maps.
@@ -53,6 +55,7 @@ class GapCheckLimits(NamedTuple):
     white_cell_neighbours: int = 5
     min_white_cell_neighbours: int = 3
     max_white_cell_misfit: float = 1.0
+    max_contact_jump: float = 0.5
     min_block_cells: int = 20
     min_block_share: float = 0.02
     contact: CornerContactLimits = CONTACT_LIMITS

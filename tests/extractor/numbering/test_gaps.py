@@ -44,14 +44,19 @@ def test_a_part_beyond_a_gap_is_numbered_no_step_aside(pattern: str, width: floa
 
 
 @pytest.mark.slow
-def test_a_pair_of_cells_that_seems_to_touch_across_a_scratch_joins_no_parts() -> None:
-    """10,981 markers in two parts, one of them walked to a step aside: one wrong contact made it part of the other."""
-    case = next(islice(provoking_cases(880231), 178, None))
+@pytest.mark.parametrize(("seed", "number", "least"), [(880231, 178, 0.97), (903377, 388, 0.7)])
+def test_cells_that_seem_to_touch_across_a_scratch_join_no_parts(
+    seed: int, number: int, least: float
+) -> None:
+    """10,981 markers in two parts, one of them walked to a step aside: one wrong contact, or all along a scratch of one
+    cell's width, made it part of the other.
+    """
+    case = next(islice(provoking_cases(seed), number, None))
     shot = case.shoot()
     markers = cached_extractor(case.layout.pattern, LARGE_LAYERS).extract(shot.image)
     error_px = np.linalg.norm(markers.xy_px - shot.truths[0].marker_xy_px, axis=1)
     assert np.nanmax(error_px) < 0.5 * LARGE_PITCH_PX
-    assert np.isfinite(error_px).mean() > 0.97
+    assert np.isfinite(error_px).mean() > least
 
 
 @pytest.mark.parametrize(

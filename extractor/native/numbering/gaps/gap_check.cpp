@@ -235,11 +235,35 @@ class Comparison {
   View<const double, 2> center_;
 };
 
-// The contacts (N, 6) of which both cells are in contact with a third one, else -1.
+// The jump, in cells, of cell b against the slope by the contacts of cell a with others; 0 without a slope.
+double contact_jump(const Contacts& contacts, View<const std::int32_t, 1> cell,
+                    View<const std::int32_t, 1> neighbours, Index a, Index b, double min_spread) {
+  const auto center = contacts.cells.center_px, center_mm = contacts.layout.center_mm;
+  Array<std::int32_t, 1> others(neighbours);
+  std::replace(others.view().begin(), others.view().end(), static_cast<std::int32_t>(b), -1);
+  Array<double, 2> slope({2, 2});
+  if (!fill_slope(a, center, cell, others, center_mm, min_spread, slope)) return 0.0;
+  const auto s = slope.view();
+  const double x_mm = center_mm(cell[b], 0) - center_mm(cell[a], 0),
+               y_mm = center_mm(cell[b], 1) - center_mm(cell[a], 1);
+  const double dx = center(b, 0) - center(a, 0) - s(0, 0) * x_mm - s(0, 1) * y_mm;
+  const double dy = center(b, 1) - center(a, 1) - s(1, 0) * x_mm - s(1, 1) * y_mm;
+  const double size = std::sqrt(std::abs(s(0, 0) * s(1, 1) - s(0, 1) * s(1, 0)));
+  return std::hypot(dx, dy) / (size * contacts.layout.size_mm[cell[b]]);
+}
+
+// The contacts (N, 6) of which both cells are in contact with a third one, and that lie where the other
+// contacts of both cells predict them, else -1.
 //
-// Across a gap a shifted center may bring one wrong pair near enough; three cells are hardly ever.
-Array<std::int32_t, 2> firm_contacts(View<const std::int32_t, 2> neighbours) {
+// Across a gap a shifted center may bring a wrong pair near enough. All cells along a gap of about one cell
+// may be so near, but not as near as neighbours are.
+Array<std::int32_t, 2> firm_contacts(const Contacts& contacts, View<const std::int32_t, 1> cell,
+                                     View<const std::int32_t, 2> neighbours, const GapCheckLimits& limits) {
   Array<std::int32_t, 2> out(neighbours);
+  const auto is_even = [&](Index a, Index b) {
+    return contact_jump(contacts, cell, neighbours[a], a, b, limits.min_slope_spread) <
+           limits.max_contact_jump;
+  };
   const Index sides = neighbours.size(1);
   for (Index i = 0; i < neighbours.size(); ++i)
     for (Index k = 0; k < sides; ++k) {
@@ -251,7 +275,7 @@ Array<std::int32_t, 2> firm_contacts(View<const std::int32_t, 2> neighbours) {
       const bool is_firm = std::any_of(touches.begin(), touches.end(), [=](std::int32_t third) {
         return third >= 0 && (third == after || third == before);
       });
-      if (!is_firm) out(i, k) = -1;
+      if (!is_firm || !is_even(i, j) || !is_even(j, i)) out(i, k) = -1;
     }
   return out;
 }
@@ -294,9 +318,11 @@ std::vector<LooseContacts> loose_contacts(View<const std::int32_t, 2> neighbours
 
 // (N,) the blocks of selected cells: joined by firm contacts, and by others unless both parts hold a large
 // block.
-Array<std::int32_t, 1> blocks_of(View<const std::int32_t, 2> neighbours, View<const bool, 1> selected,
+Array<std::int32_t, 1> blocks_of(const Contacts& contacts, View<const std::int32_t, 1> cell,
+                                 View<const std::int32_t, 2> neighbours, View<const bool, 1> selected,
                                  const GapCheckLimits& limits) {
-  Array<std::int32_t, 1> block = connected_components(firm_contacts(neighbours), selected);
+  Array<std::int32_t, 1> block =
+      connected_components(firm_contacts(contacts, cell, neighbours, limits), selected);
   const Array<std::int64_t, 1> sizes = block_sizes(block);
   const auto total = static_cast<double>(std::count(selected.begin(), selected.end(), true));
   const double large = std::max(static_cast<double>(limits.min_block_cells), limits.min_block_share * total);
@@ -331,7 +357,7 @@ Array<bool, 1> consistent_cells(const Contacts& contacts, View<const std::int32_
   const auto center = contacts.cells.center_px;
   Array<bool, 1> selected({count});
   for (Index i = 0; i < count; ++i) selected[i] = contacts.cells.is_intact[i] && cell[i] >= 0;
-  const Array<std::int32_t, 1> block = blocks_of(neighbours, selected, limits);
+  const Array<std::int32_t, 1> block = blocks_of(contacts, cell, neighbours, selected, limits);
   Array<std::int64_t, 1> sizes = block_sizes(block);
   if (sizes.size() == 0) return Array<bool, 1>({count}, false);
   const Index largest = std::max_element(sizes.begin(), sizes.end()) - sizes.begin();

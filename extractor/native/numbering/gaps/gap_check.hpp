@@ -14,6 +14,7 @@ namespace cmp::numbering {
 // Limits of the check; explained in extractor/numbering/gaps/gap_check.py.
 struct GapCheckLimits {
   double max_median_jump, max_jump_share, max_single_jump, max_gap, max_gap_ratio, min_slope_spread;
+  double max_contact_jump;
   Index reference_candidates, white_cell_neighbours, min_white_cell_neighbours;
   double max_white_cell_misfit;
   Index min_block_cells;
@@ -28,6 +29,7 @@ struct GapCheckLimits {
             f["max_gap"],
             f["max_gap_ratio"],
             f["min_slope_spread"],
+            f["max_contact_jump"],
             f["reference_candidates"],
             f["white_cell_neighbours"],
             f["min_white_cell_neighbours"],
