@@ -23,20 +23,13 @@ struct GapCheckLimits {
 
   template <class F>
   static GapCheckLimits read(const F& f) {
-    return {f["max_median_jump"],
-            f["max_jump_share"],
-            f["max_single_jump"],
-            f["max_gap"],
-            f["max_gap_ratio"],
-            f["min_slope_spread"],
-            f["max_contact_jump"],
-            f["reference_candidates"],
-            f["white_cell_neighbours"],
-            f["min_white_cell_neighbours"],
-            f["max_white_cell_misfit"],
-            f["min_block_cells"],
-            f["min_block_share"],
-            f["contact"]};
+    return {f["max_median_jump"],       f["max_jump_share"],
+            f["max_single_jump"],       f["max_gap"],
+            f["max_gap_ratio"],         f["min_slope_spread"],
+            f["max_contact_jump"],      f["reference_candidates"],
+            f["white_cell_neighbours"], f["min_white_cell_neighbours"],
+            f["max_white_cell_misfit"], f["min_block_cells"],
+            f["min_block_share"],       f["contact"]};
   }
 };
 
