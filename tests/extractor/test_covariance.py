@@ -80,7 +80,7 @@ def test_the_covariance_of_a_measured_marker_is_true(preset: str, kind: str) -> 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_outermost_layer_has_larger_covariances(preset: str, kind: str) -> None:
     """Maps are one-sided there. With the couplings of moved ends, z would be up to 1.22."""
-    assert 0.9 < summarise(squares_of(preset, kind).rim).z.value < 1.12
+    assert 0.85 < summarise(squares_of(preset, kind).rim).z.value < 1.12
 
 
 @pytest.mark.parametrize("kind", SCENE_KINDS)
