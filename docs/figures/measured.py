@@ -18,7 +18,11 @@ from extractor.presets import PRESETS
 
 # Figures of runs that are too long to be published with every change: what, figure, benchmark.
 STATED = (
-    ("random damage, 2,100 pictures", "9 of 675,109 markers off by more than 0.3 edges, none with another marker's id", "damage"),
+    (
+        "random damage, 2,100 pictures",
+        "9 of 675,109 markers off by more than 0.3 edges, none with another marker's id",
+        "damage",
+    ),
     (
         "two views, press of 1 mm",
         "0.6 um across, 1.5 um in depth ([table](docs/how-to/reconstruction.md#how-precise))",
