@@ -51,12 +51,7 @@ Bending bending_by(View<const double, 3> maps, const layout::Topology& topology,
                                    u * u * y[2] + 2.0 * u * v * y[3] + v * v * y[4]);
     curvature[side] = std::isfinite(curve) ? curve : 0.0;
   }
-  auto [leave, arrive] = slope;
-  if (!std::isfinite(arrive)) arrive = -leave;
-  if (!std::isfinite(leave)) leave = -arrive;
-  if (!std::isfinite(leave)) leave = arrive = 0.0;
-  leave += scatter_share * (-(2.0 * curvature[0] + curvature[1]) / 6.0 - leave);
-  arrive += scatter_share * ((curvature[0] + 2.0 * curvature[1]) / 6.0 - arrive);
+  const auto [leave, arrive] = EndSlopes(slope[0], slope[1], curvature[0], curvature[1], scatter_share);
   return {0.5 * (leave - arrive), 0.5 * (leave + arrive)};
 }
 

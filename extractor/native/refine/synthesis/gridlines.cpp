@@ -148,18 +148,11 @@ Array<double, 2> gridlines(View<const double, 2> xy, View<const double, 3> maps,
     const double length = std::sqrt(dx * dx + dy * dy);
     if (!(length > limits.min_length_px)) continue;
     const double ux = dx / length, uy = dy / length;
-    double leave = slope_at(maps[a], along[e], ux, uy, limits.max_slope);
-    double arrive = slope_at(maps[b], along[e], ux, uy, limits.max_slope);
-    // where one end's direction is unknown the gridline is a parabola, where both are, straight
-    if (!std::isfinite(arrive)) arrive = -leave;
-    if (!std::isfinite(leave)) leave = -arrive;
-    if (!std::isfinite(leave)) leave = arrive = 0.0;
-    if (scatter_share > 0.0) {
-      // the cubic with the second derivatives of both ends
-      const double at_a = curved_by(maps[a], along[e], ux, uy), at_b = curved_by(maps[b], along[e], ux, uy);
-      leave += scatter_share * (-(2.0 * at_a + at_b) / (6.0 * length) - leave);
-      arrive += scatter_share * ((at_a + 2.0 * at_b) / (6.0 * length) - arrive);
-    }
+    const auto slope = [&](Index m) { return slope_at(maps[m], along[e], ux, uy, limits.max_slope); };
+    const auto curve = [&](Index m) {
+      return scatter_share > 0.0 ? curved_by(maps[m], along[e], ux, uy) / length : 0.0;
+    };
+    const auto [leave, arrive] = EndSlopes(slope(a), slope(b), curve(a), curve(b), scatter_share);
     const auto line = out[e];
     line[X] = xy(a, 0);
     line[Y] = xy(a, 1);

@@ -6,6 +6,8 @@
 // of the map (Clough-Tocher) has it.
 #pragma once
 
+#include <cmath>
+
 #include "base/array.hpp"
 #include "localmap/regularised_maps.hpp"
 
@@ -37,10 +39,10 @@ struct ExtrapolatedMarkers {
 // (M, 2, 5), the local map at each marker: derivatives of x and y by the layout's x, y, xx, xy, yy;
 // NaN where unknown.
 //
-// Where all markers of the stencil are known, the derivatives are by the stencil. Elsewhere they are those of a
-// quadratic through the known ones, whose second derivatives are regularised towards 0 and are 0 where fewer
-// than five are known. xy (M, 2) px, NaN where unknown; near, offset and stencil: ring_markers, ring_vectors
-// and derivative_stencil of the topology.
+// Where all markers of the stencil are known, the derivatives are by the stencil. Elsewhere they are those of
+// a quadratic through the known ones, whose second derivatives are regularised towards 0 and are 0 where
+// fewer than five are known. xy (M, 2) px, NaN where unknown; near, offset and stencil: ring_markers,
+// ring_vectors and derivative_stencil of the topology.
 Array<double, 3> local_maps(View<const double, 2> xy, View<const std::int32_t, 2> near,
                             View<const double, 3> offset, View<const double, 3> stencil,
                             const GridlineLimits& limits);
@@ -70,6 +72,24 @@ Array<double, 2> extrapolate_rings(View<const double, 2> xy, View<const std::int
 Array<double, 2> gridlines(View<const double, 2> xy, View<const double, 3> maps, View<const double, 2> bend,
                            View<const std::int32_t, 2> edges, View<const double, 2> along,
                            double scatter_share, const GridlineLimits& limits);
+
+// The slopes of a gridline at its start and end, from those of the maps' tangents and from how the maps curve
+// it at both ends (second derivative by the share of the chord, in the unit of the slopes).
+//
+// Where the direction of one end is unknown (NaN) the gridline is a parabola, where both are, straight.
+struct EndSlopes {
+  double leave, arrive;
+
+  EndSlopes(double by_start, double by_end, double start_curve, double end_curve, double scatter_share)
+      : leave(by_start), arrive(by_end) {
+    if (!std::isfinite(arrive)) arrive = -leave;
+    if (!std::isfinite(leave)) leave = -arrive;
+    if (!std::isfinite(leave)) leave = arrive = 0.0;
+    // the cubic with the second derivatives of both ends
+    leave += scatter_share * (-(2.0 * start_curve + end_curve) / 6.0 - leave);
+    arrive += scatter_share * ((start_curve + 2.0 * end_curve) / 6.0 - arrive);
+  }
+};
 
 // px, the offset of a gridline from its chord at the fraction t of the chord; straight beyond the ends.
 inline double sagitta(double t, double length, double leave, double arrive) {
