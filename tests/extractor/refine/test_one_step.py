@@ -1,4 +1,7 @@
-"""What one step by synthesis leaves of the markers' errors."""
+"""What one step by synthesis leaves of the markers' errors.
+
+Inside: the reader takes as many steps as a picture needs, and no result says what one of them leaves.
+"""
 
 from __future__ import annotations
 
