@@ -30,10 +30,9 @@ from extractor.refine.refinement_step import (
     with_solution,
 )
 from extractor.refine.solve.convergence import (
-    convergence_covariance,
-    remaining_error,
+    bending_change,
     remaining_share,
-    typical_deviation,
+    step_remainder,
 )
 from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
@@ -41,7 +40,6 @@ from extractor.refine.synthesis.dot_gain import DotGainLimits
 
 WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending. Chosen
 MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
-READ_SUM = 0  # column of a drawing's sums; above 0 where a gridline is read
 
 
 class SynthesisLimits(NamedTuple):
@@ -140,10 +138,9 @@ class SynthesisSolver:
         for _ in range(LIMITS.max_steps):
             before = self._drawn(estimate)
             estimate, drawing = self._full_step(view, before)
-            last, shift = shift, estimate.measured - drawing.xy
             share = remaining_share(drawing.sigma, drawing.edge_px)
-            cov = convergence_covariance(shift, last, drawing.sigma, share)
-            remainder = remaining_error(cov, estimate.information)
+            step = estimate.measured, drawing.xy, shift
+            shift, cov, remainder = step_remainder(*step, drawing.sigma, share, estimate.information)
             if remainder < schedule.small_remainder and self._is_settled(before, estimate, drawing):
                 break
         return estimate._replace(convergence_cov_px2=cov)
@@ -164,15 +161,12 @@ class SynthesisSolver:
         Blur or dot gain that has changed, gridlines that bend, and markers that scatter are drawn otherwise.
         """
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
-        read = drawing.sums[:, READ_SUM] > 0.0
-        if change_px >= LIMITS.small_change * before.sigma or not read.any():
+        if change_px >= LIMITS.small_change * before.sigma:
             return False
-        if is_blur_wide(before.sigma, drawing.edge_px):
-            return True
-        bend_px = np.sqrt(np.mean((after.bend[read] - before.bend[read]) ** 2))
-        if bend_px >= LIMITS.small_bend * typical_deviation(after.information):
+        # with wide blur no gridline bends
+        if bending_change(before.bend, after.bend, drawing.sums, after.information) >= LIMITS.small_bend:
             return False
-        return scatter_of(self._topology, after) == NO_SCATTER
+        return is_blur_wide(before.sigma, drawing.edge_px) or scatter_of(self._topology, after) == NO_SCATTER
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
         """A step from all measurements."""

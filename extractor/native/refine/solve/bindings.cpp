@@ -7,8 +7,9 @@
 namespace cmp::refine {
 
 void add_solve(nb::module_ module) {
-  bind<&convergence_covariance>(module, "convergence_covariance",
-                                {"shift", "last", "sigma", "remaining_share", "limits"});
+  bind<&step_remainder>(module, "step_remainder",
+                        {"measured", "drawn", "last", "sigma", "remaining_share", "diagonal", "limits"});
+  bind<&bending_change>(module, "bending_change", {"before", "after", "sums", "diagonal"});
   bind<&solve_shifts>(module, "solve_shifts",
                       {"diagonal", "off_diagonal", "edges", "right", "whole", "limits"});
   bind<&covariances>(
