@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -38,8 +37,7 @@ class CornerLimits(NamedTuple):
 LIMITS = CornerLimits()
 
 
-@dataclass(frozen=True, eq=False)
-class InitialMarkers:
+class InitialMarkers(NamedTuple):
     """Numbered markers before refinement.
 
     Attributes:

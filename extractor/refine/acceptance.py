@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import markers as native
-from extractor.numbering.marker_places import MAX_PLACE_ERROR
-from extractor.refine.estimate import StartPlaces
+from extractor.numbering.marker_places import MAX_PLACE_ERROR, InitialMarkers
 from extractor.refine.measure.gridline_bending import LIMITS as BENDING_LIMITS
 from extractor.refine.refinement_step import PRIOR_PX
 from extractor.refine.solve.fisher_information import LIMITS as INFORMATION_LIMITS
@@ -72,7 +71,7 @@ def accepted_markers(
     bend_variance: NDArray[np.float64],
     edges: NDArray[np.int32],
     spokes: NDArray[np.int32],
-    places: StartPlaces,
+    places: InitialMarkers,
     selected: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The markers that lie near their start place with a small deviation.
@@ -125,7 +124,7 @@ def update_unaccepted_markers(
         xy, cov: (M, 2) px and (M, 2, 2) px^2, NaN where not accepted. Where all is ``unexplained``, markers far from
             their start become NaN.
         reliable: (M, 2) px, NaN where the image shows a marker little.
-        start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
+        start, edge: (M, 2) px, (M,) px, as in ``InitialMarkers``.
         unexplained: the drawing does not explain the image.
         dot_gain: px.
 
@@ -151,7 +150,7 @@ def update_lost_markers(
         xy, cov: (M, 2) px and (M, 2, 2) px^2; unaccepted markers far from where they are predicted become NaN.
         unaccepted: (M,) bool.
         predicted: (M, 2) px, the markers by their neighbours.
-        start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
+        start, edge: (M, 2) px, (M,) px, as in ``InitialMarkers``.
 
     Returns:
         (M,) bool, the markers with a start that are not accepted.

@@ -82,12 +82,10 @@ def draw_pattern(
     """Draw the whole pattern of the estimate into the picture (H, W, 3), and compare it with the image."""
     height, width = view.image.shape[:2]
     box = pattern_box(estimate.xy, MARGIN_SIGMA * estimate.sigma + 2, width, height)
-    state = estimate.pattern_state()
     *drawn, levels, edge_px = native.draw_pattern(
-        view, topology, picture, state, estimate.levels, box, LIMITS
+        view, topology, picture, estimate, estimate.levels, box, LIMITS
     )
     lines, sides, contrasts, added, sums = drawn
     corrected = InkLevels(*levels)
-    return Synthesis(
-        state.xy, lines, state.bend, sides, contrasts, added, sums, corrected, state.sigma, edge_px
-    )
+    where = estimate.xy, lines, estimate.bend
+    return Synthesis(*where, sides, contrasts, added, sums, corrected, estimate.sigma, edge_px)

@@ -94,8 +94,7 @@ def profile_step(
     Returns:
         The estimate after the round, and (E,) 0 to 1, similarity of gridlines to the pattern.
     """
-    state = estimate.pattern_state()
-    found = native.profile_step(view, lines, contrasts, state, topology, stations, LIMITS)
+    found = native.profile_step(view, lines, contrasts, estimate, topology, stations, LIMITS)
     step = ProfileStep(*(*found[:-1], step_solution(*found[-1])))
-    others = {"weight": step.weight, "dot_gain": step.dot_gain}
-    return with_solution(estimate, step.solution, **others), step.profile_weight
+    after = with_solution(estimate, step.solution, weight=step.weight, dot_gain=step.dot_gain)
+    return after, step.profile_weight

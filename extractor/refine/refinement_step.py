@@ -95,7 +95,8 @@ def extrapolate_pattern(xy: NDArray[np.float64], topology: Topology) -> Extrapol
 
 def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
     """The estimate with its pattern at the markers of the last step."""
-    return estimate._replace(**extrapolate_pattern(estimate.reliable, topology)._asdict())
+    moved = extrapolate_pattern(estimate.reliable, topology)
+    return estimate._replace(xy=moved.xy, hidden=moved.hidden, maps=moved.maps)
 
 
 def scatter_of(topology: Topology, estimate: Estimate) -> MarkerScatter:
@@ -130,4 +131,10 @@ def step_solution(
 
 def with_solution(estimate: Estimate, solution: StepSolution, **others: Any) -> Estimate:
     """The estimate after a step, and with other new fields."""
-    return estimate._replace(**solution._asdict(), **others)
+    return estimate._replace(
+        measured=solution.measured,
+        reliable=solution.reliable,
+        bend=solution.bend,
+        information=solution.information,
+        **others,
+    )

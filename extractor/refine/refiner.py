@@ -7,8 +7,7 @@ One such step is nearly enough.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,6 @@ from extractor.refine.estimate import (
     Estimate,
     RefinedMarkers,
     places_in_view,
-    start_places,
 )
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
@@ -82,7 +80,15 @@ class Refiner:
         self._virtual = virtual_per_edge
         self._schedule = SCHEDULES[preset]
         self._synthesis_solver = SynthesisSolver(topology)
-        self._every_marker = np.ones(len(topology.spokes), np.bool_)
+        markers, edges = len(topology.spokes), len(topology.edges)
+        self._every_marker = np.ones(markers, np.bool_)
+        self._unmeasured: dict[str, Any] = {
+            "information": Information(np.zeros((markers, 3)), np.zeros((edges, 4))),
+            "roughness": np.zeros(markers),
+            "bend_variance": np.zeros(edges),
+            "bend": np.zeros((edges, 2)),
+            "weight": np.ones(edges),
+        }
 
     def __call__(
         self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None = None
@@ -140,7 +146,6 @@ class Refiner:
             The estimate, the contrasts across the gridlines, and the places without outliers.
         """
         topology = self._topology
-        markers, edges = len(topology.spokes), len(topology.edges)
         xy, hidden, maps = extrapolate_pattern(view.to_level(start), topology)
         look = before or initial_appearance(view, topology, xy)
         estimate = Estimate(
@@ -153,11 +158,7 @@ class Refiner:
             noise=look.noise,
             levels=look.levels,
             pixel_noise=look.pixel_noise,
-            information=Information(np.zeros((markers, 3)), np.zeros((edges, 4))),
-            roughness=np.zeros(markers),
-            bend_variance=np.zeros(edges),
-            bend=np.zeros((edges, 2)),
-            weight=np.ones(edges),
+            **self._unmeasured,
         )
         lines = gridlines_of(topology, estimate)
         contrasts = update_edge_contrasts(view, topology, estimate, lines)
@@ -185,7 +186,7 @@ class Refiner:
         places = places_in_view(view, places)
         if estimate.dot_gain != 0.0:
             xy = markers_without_dot_gain(places.xy_px, self._topology.cells, estimate.dot_gain)
-            places = replace(places, xy_px=xy)
+            places = places._replace(xy_px=xy)
         estimate = self._synthesis_solver.steps(view, estimate, self._schedule)
         return self._accept_or_recover(view, estimate, contrasts, places)
 
@@ -222,7 +223,7 @@ class Refiner:
         assert reading is not None
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
-        xy, cov = native.at_full_scale(xy, cov, start_places(places), scale, FULL_SCALE_LIMITS)
+        xy, cov = native.at_full_scale(xy, cov, places, scale, FULL_SCALE_LIMITS)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look)
         blur, noise = scale * estimate.sigma, scale * estimate.noise
@@ -235,9 +236,8 @@ class Refiner:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Markers and covariances of an estimate; NaN where not accepted."""
         measured, spokes = (estimate.measured, estimate.information), self._topology.spokes
-        started = start_places(places)
         xy, cov = accepted_markers(
-            *measured, estimate.bend_variance, self._topology.edges, spokes, started, self._every_marker
+            *measured, estimate.bend_variance, self._topology.edges, spokes, places, self._every_marker
         )
         add_dirt_variance(cov, estimate.weight, spokes, places.edge_px)
         if estimate.convergence_cov_px2 is not None:

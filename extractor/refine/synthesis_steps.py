@@ -176,7 +176,7 @@ class SynthesisSolver:
     def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
         """The estimate after the step by the sums of the drawing."""
         topology, levels = self._topology, drawing.corrected_levels
-        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, LIMITS)
+        found = native.update_and_solve(drawing, estimate, topology, LIMITS)
         read = SynthesisReading(*(*found[:-1], step_solution(*found[-1])))
         weights = read.weight, read.variance_ratio, read.dot_gain_offset
         how = drawing.sides, drawing.added, *weights, drawing.sigma, read.noise
