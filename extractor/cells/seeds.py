@@ -108,4 +108,5 @@ def domain_moments(seeds: Seeds) -> NDArray[np.float64]:
 
 def has_large_domains(seeds: Seeds) -> bool:
     """Whether only few domains are too small for safe recognition."""
-    return len(seeds.area_px) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL_SHARE
+    domains = len(seeds.area_px)
+    return domains > 0 and int(np.count_nonzero(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL_SHARE * domains

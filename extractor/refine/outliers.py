@@ -74,11 +74,8 @@ def correct_outliers(
         profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         places: of the full image.
     """
-    suspect = native.suspect_markers(profile_weight, estimate.weight, topology.spokes, LIMITS)
-    if not suspect.any():
-        return estimate, places
     found, measured, reliable, xy, agreed, is_intact = native.correct_outliers(
-        topology, estimate, places, suspect, view.scale, LIMITS
+        topology, estimate, places, profile_weight, view.scale, LIMITS
     )
     if not found:
         return estimate, places

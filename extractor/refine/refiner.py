@@ -18,10 +18,8 @@ from extractor.layout.topology import Topology
 from extractor.numbering.marker_places import AGREED_DEVIATION, InitialMarkers
 from extractor.presets import SCHEDULES, Preset
 from extractor.refine.acceptance import (
-    accepted_markers,
-    add_dirt_variance,
+    accept_markers,
     update_lost_markers,
-    update_unaccepted_markers,
 )
 from extractor.refine.estimate import (
     Appearance,
@@ -55,8 +53,6 @@ SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at
 MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
-# Noise of the drawing over that of the pixels, above which the drawing explains too little to move a marker far.
-UNEXPLAINED_NOISE_RATIO = 3.0
 
 
 class FullScaleLimits(NamedTuple):
@@ -81,7 +77,6 @@ class Refiner:
         self._schedule = SCHEDULES[preset]
         self._synthesis_solver = SynthesisSolver(topology)
         markers, edges = len(topology.spokes), len(topology.edges)
-        self._every_marker = np.ones(markers, np.bool_)
         self._unmeasured: dict[str, Any] = {
             "information": Information(np.zeros((markers, 3)), np.zeros((edges, 4))),
             "roughness": np.zeros(markers),
@@ -196,16 +191,11 @@ class Refiner:
         """The accepted markers; where the drawing does not explain the image, as in glare, the markers by many
         profiles.
         """
-        xy, cov = self._accepted_markers(estimate, places)
-        unexplained = estimate.noise > UNEXPLAINED_NOISE_RATIO * estimate.pixel_noise
-        start = places.xy_px, places.edge_px
-        unaccepted, some = update_unaccepted_markers(
-            xy, cov, estimate.reliable, *start, unexplained, estimate.dot_gain
-        )
-        if not some:
+        xy, cov, unaccepted, all_accepted = accept_markers(estimate, places, self._topology)
+        if all_accepted:
             return self._refined_markers(view, estimate, xy, cov, ~unaccepted, places)
         moved = with_pattern_moved(self._topology, estimate)
-        lost = update_lost_markers(xy, cov, unaccepted, moved.xy, *start)
+        lost = update_lost_markers(xy, cov, unaccepted, moved.xy, places.xy_px, places.edge_px)
         fill_recovered_markers(view, self._topology, moved, contrasts, places, lost, xy, cov)
         return self._refined_markers(view, estimate, xy, cov, ~lost, places)
 
@@ -230,19 +220,6 @@ class Refiner:
         return RefinedMarkers(
             xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)
         )
-
-    def _accepted_markers(
-        self, estimate: Estimate, places: InitialMarkers
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Markers and covariances of an estimate; NaN where not accepted."""
-        measured, spokes = (estimate.measured, estimate.information), self._topology.spokes
-        xy, cov = accepted_markers(
-            *measured, estimate.bend_variance, self._topology.edges, spokes, places, self._every_marker
-        )
-        add_dirt_variance(cov, estimate.weight, spokes, places.edge_px)
-        if estimate.convergence_cov_px2 is not None:
-            cov += estimate.convergence_cov_px2
-        return xy, cov
 
 
 def rescaled(estimate: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estimate:

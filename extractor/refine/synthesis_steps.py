@@ -105,6 +105,7 @@ class SynthesisSolver:
 
     def __init__(self, topology: Topology) -> None:
         self._topology = topology
+        self._no_shift = np.full((len(topology.spokes), 2), np.nan)
         self._kept = threading.local()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -134,7 +135,7 @@ class SynthesisSolver:
             estimate: after the round of profiles.
             schedule: the error that a step may leave for no step to follow.
         """
-        shift = np.full_like(estimate.xy, np.nan)
+        shift = self._no_shift
         for _ in range(LIMITS.max_steps):
             before = self._drawn(estimate)
             estimate, drawing = self._full_step(view, before)
