@@ -25,8 +25,8 @@ void add_numbering(nb::module_ module) {
                            {"image", "center", "axial", "known", "inks", "layout", "limits"});
   bind<&predicted_corners>(module, "predicted_corners",
                            {"center_px", "cell", "layout", "mirrored", "limits"});
-  bind<&cell_corners>(module, "cell_corners", {"cells", "vectors_mm", "corner_ids", "limits"});
-  bind<&average_corners>(module, "average_corners", {"corners", "count", "limits"});
+  bind<&merge_corners>(module, "merge_corners",
+                       {"cells", "numbers", "layout", "corner_ids", "markers", "limits"});
 }
 
 }  // namespace cmp::numbering
