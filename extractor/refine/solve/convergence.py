@@ -82,17 +82,17 @@ def step_remainder(
 def bending_change(
     before: NDArray[np.float64],
     after: NDArray[np.float64],
-    sums: NDArray[np.float64],
+    is_read: NDArray[np.bool_],
     information: Information,
 ) -> float:
     """The RMS change of the bending (E, 2) px of the gridlines that are read, in deviations of a typical marker.
 
     Args:
         before, after: the bending.
-        sums: (E, 24), as in ``Synthesis``.
+        is_read: (E,) bool.
         information: about the markers.
 
     Returns:
         Infinity where no gridline is read.
     """
-    return float(native.bending_change(before, after, sums, information.diagonal))
+    return float(native.bending_change(before, after, is_read, information.diagonal))
