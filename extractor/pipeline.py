@@ -113,7 +113,7 @@ class Stages:
         now = time.perf_counter()
         self.timings_ms[name] = self.timings_ms.get(name, 0.0) + 1e3 * (now - self._last)
         self.results[name] = result
-        self._last = time.perf_counter()
+        self._last = now
         return result
 
 

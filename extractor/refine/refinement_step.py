@@ -80,12 +80,12 @@ class ExtrapolatedPattern(NamedTuple):
 
 
 class StepSolution(NamedTuple):
-    """Markers and gridlines after a step; fields as in ``Estimate``."""
+    """Markers and gridlines after a step; fields as in ``Estimate``, and the two blocks of its information."""
 
     measured: NDArray[np.float64]
     reliable: NDArray[np.float64]
     bend: NDArray[np.float64]
-    information: Information
+    blocks: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def extrapolate_pattern(xy: NDArray[np.float64], topology: Topology) -> ExtrapolatedPattern:
@@ -119,22 +119,12 @@ def gridlines_of(topology: Topology, estimate: Estimate) -> NDArray[np.float64]:
     return np.asarray(gridlines(*where, topology.edges, topology.edge_vectors, estimate.scatter.share))
 
 
-def step_solution(
-    measured: NDArray[np.float64],
-    reliable: NDArray[np.float64],
-    bend: NDArray[np.float64],
-    blocks: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> StepSolution:
-    """The solution of native arrays."""
-    return StepSolution(measured, reliable, bend, Information(*blocks))
-
-
 def with_solution(estimate: Estimate, solution: StepSolution, **others: Any) -> Estimate:
     """The estimate after a step, and with other new fields."""
     return estimate._replace(
         measured=solution.measured,
         reliable=solution.reliable,
         bend=solution.bend,
-        information=solution.information,
+        information=Information(*solution.blocks),
         **others,
     )

@@ -23,8 +23,8 @@ from extractor.refine.refinement_step import (
     PIXEL_MISFIT_RULE,
     MisfitRule,
     StepLimits,
+    StepSolution,
     scatter_of,
-    step_solution,
     with_bending,
     with_pattern_moved,
     with_solution,
@@ -80,7 +80,7 @@ class SynthesisStep(NamedTuple):
 
     Attributes:
         reading: the gridlines as they were drawn and read.
-        solution: measured, reliable and bend of ``StepSolution``, and the blocks of its information.
+        solution: the markers after the step, the fields of ``StepSolution``.
         bend_variance: (E,) px^2.
         dot_gain: px.
         sigma: px, the blur after the step.
@@ -180,7 +180,7 @@ class SynthesisSolver:
         reading = GridlineReading(*step.reading)
         after = with_solution(
             estimate,
-            step_solution(*step.solution),
+            StepSolution(*step.solution),
             bend_variance=step.bend_variance,
             weight=reading.weight,
             reading=reading,
