@@ -59,6 +59,8 @@ class Borrowed {
   // Notes that something was read that may change later: an array, or an object that is no tuple.
   void note_changeable() { ++changeable_; }
   std::size_t changeable() const { return changeable_; }
+  // Notes that nothing that was read since there were `before` such things will change.
+  void note_lasting(std::size_t before) { changeable_ = before; }
 
  private:
   std::vector<Py_buffer> buffers_;
@@ -227,9 +229,13 @@ concept Record = requires(const Fields& fields) {
   { T::read(fields) } -> std::same_as<T>;
 };
 
+// A record of tables that are made once, as those of a layout; their arrays keep their shape.
+template <class T>
+concept Lasting = Record<T> && T::is_lasting;
+
 template <Record T>
 struct FromPython<T> {
-  // A tuple of nothing but numbers and such tuples, as limits are, is read once.
+  // A tuple of nothing but numbers and such tuples, as limits are, is read once; so is one of lasting tables.
   static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
     static PyObject* last = nullptr;  // is kept, so that no other object gets its address
     static std::optional<T> record;
@@ -237,6 +243,7 @@ struct FromPython<T> {
     if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
     const std::size_t before = borrowed.changeable();
     T found = T::read(Fields(object, name, borrowed));
+    if constexpr (Lasting<T>) borrowed.note_lasting(before);
     if (PyTuple_Check(object.ptr()) != 0 && borrowed.changeable() == before) {
       Py_INCREF(object.ptr());
       Py_XDECREF(last);

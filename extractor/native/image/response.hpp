@@ -17,7 +17,8 @@ inline constexpr auto STEPS_PER_ROOT = static_cast<float>((ENTRIES - 1) / ROOT_O
 
 // A response; light is in units of 1/255 of the light of the value 255.
 struct ResponseTables {
-  View<const float, 1> light;    // (256,) the light of each value
+  static constexpr bool is_lasting = true;  // read once, as base/binding.hpp says
+  View<const float, 1> light;               // (256,) the light of each value
   View<const float, 1> encoded;  // (2 * ENTRIES,) value and derivative at equal steps of light's root
   View<const std::uint16_t, 1> light_steps;    // (256,) the light of each value in LIGHT_STEPS steps
   View<const std::uint8_t, 1> value_of_steps;  // (LIGHT_STEPS,) the nearest value of the light of each step

@@ -11,6 +11,7 @@ inline constexpr std::int32_t UNKNOWN_AXIAL = -(1 << 20);
 
 // The layout's U colored cells.
 struct LayoutCells {
+  static constexpr bool is_lasting = true;  // read once, as base/binding.hpp says
   View<const double, 2> center_mm;          // (U, 2) layout frame
   View<const std::uint8_t, 1> ink;          // (U,) 1 red, 2 green, 3 blue
   View<const double, 1> size_mm;            // (U,) the mean side
@@ -26,11 +27,12 @@ struct LayoutCells {
 
 // The neighbours of the layout's M markers; -1 for no neighbour.
 struct RingTables {
-  View<const double, 2> marker_mm;         // (M, 2) layout frame
-  View<const std::int32_t, 2> neighbours;  // (M, 18) the markers in the two rings around each marker
-  View<const double, 2> ring_weights;      // (M, 18) weights of these that give a marker's place, or 0
-  View<const std::int32_t, 2> first_ring;  // (M, 6) the six markers around each marker
-  View<const bool, 1> present;             // (M,) the markers that touch a colored or white cell
+  static constexpr bool is_lasting = true;  // read once, as base/binding.hpp says
+  View<const double, 2> marker_mm;          // (M, 2) layout frame
+  View<const std::int32_t, 2> neighbours;   // (M, 18) the markers in the two rings around each marker
+  View<const double, 2> ring_weights;       // (M, 18) weights of these that give a marker's place, or 0
+  View<const std::int32_t, 2> first_ring;   // (M, 6) the six markers around each marker
+  View<const bool, 1> present;              // (M,) the markers that touch a colored or white cell
   Index layers;
 
   template <class F>

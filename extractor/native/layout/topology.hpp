@@ -8,6 +8,7 @@ namespace cmp::layout {
 // Tables of M markers, E edges, K drawn cells (the colored ones and the white one) and B black cells; -1:
 // none.
 struct Topology {
+  static constexpr bool is_lasting = true;  // read once, as base/binding.hpp says
   View<const std::int32_t, 2> edges;        // (E, 2) marker ids, the smaller first
   View<const std::int32_t, 2> cells;        // (K, 3) marker ids of the drawn cells
   View<const std::int32_t, 1> cell_color;   // (K,) red 0, green 1, blue 2, white 4

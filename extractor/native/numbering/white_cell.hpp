@@ -8,9 +8,10 @@ namespace cmp::numbering {
 
 // The places that are sampled, as axial steps from the center of the white cell.
 struct WhiteCellPoints {
-  View<const double, 2> inside;    // (P, 2) in the three corners, then anywhere in the cell
-  View<const double, 2> outside;   // (Q, 2) beyond the corners and the sides
-  View<const double, 2> centroid;  // (R, 2) a grid
+  static constexpr bool is_lasting = true;  // read once, as base/binding.hpp says
+  View<const double, 2> inside;             // (P, 2) in the three corners, then anywhere in the cell
+  View<const double, 2> outside;            // (Q, 2) beyond the corners and the sides
+  View<const double, 2> centroid;           // (R, 2) a grid
 
   template <class F>
   static WhiteCellPoints read(const F& f) {
