@@ -15,10 +15,9 @@ inline double polynomial(const Form& form, double r) {
   return value;
 }
 
-// The overlap of near end with near end, of near end with the far end of the second gridline, and of near end
-// with the far end of the first.
+// The overlap of near end with near end, and of the near end of the other gridline with the far end of one.
 struct Overlap {
-  double near, far_second, far_first;
+  double near, far_first, far_second;
 };
 
 // The overlap of the derivatives by two gridlines that leave one marker at an angle; first and second, 1/px,
@@ -33,38 +32,33 @@ inline Overlap overlap(double cosine, double first, double second, double sigma,
   const double square = sigma * sigma * per * per * per * form / std::numbers::pi * first * second;
   const double plain = per * polynomial(limits.plain_form, r) / (2.0 * std::numbers::pi);
   const double near = plain - linear * (first + second) + square;
-  return {std::max(near, 0.0), linear * second - square, linear * first - square};
+  return {std::max(near, 0.0), linear * first - square, linear * second - square};
 }
 
 }  // namespace
 
-void accumulate_overlaps(MarkerGridlines& at, double sigma, const SharedPixelLimits& limits) {
+MarkerOverlaps overlaps_of(const MarkerGridlines& at, double sigma, const SharedPixelLimits& limits) {
+  MarkerOverlaps out;
   const SharedPixelLimits own_limits = limits;
-  for (Index i = 0; i < MARKER_GRIDLINES; ++i) {
-    LaneGridlines one = at[i];  // a copy of its own cannot overlap the others, as the compiler sees
-    for (Index j = i + 1; j < MARKER_GRIDLINES; ++j) {
-      LaneGridlines& other = at[j];
-      for (Index k = 0; k < MARKER_LANES; ++k) {
+  std::size_t pair = 0;
+  for (std::size_t i = 0; i < MARKER_GRIDLINES; ++i) {
+    const LaneGridlines& one = at[i];
+    for (std::size_t j = i + 1; j < MARKER_GRIDLINES; ++j, ++pair) {
+      const LaneGridlines& other = at[j];
+      LaneOverlaps& shared = out[pair];
+#pragma omp simd
+      for (std::size_t k = 0; k < MARKER_LANES; ++k) {
         const double color =
             one.red[k] * other.red[k] + one.green[k] * other.green[k] + one.blue[k] * other.blue[k];
-        const double dot = color * std::min(one.weight[k], other.weight[k]);
         const double cosine = one.x[k] * other.x[k] + one.y[k] * other.y[k];
-        const Overlap shared =
-            overlap(cosine, one.inverse_length[k], other.inverse_length[k], sigma, own_limits);
-        const double near = dot * shared.near, to_one = dot * shared.far_first,
-                     to_other = dot * shared.far_second;
-        one.near_x[k] += near * other.normal_x[k];
-        one.near_y[k] += near * other.normal_y[k];
-        one.far_x[k] += to_one * other.normal_x[k];
-        one.far_y[k] += to_one * other.normal_y[k];
-        other.near_x[k] += near * one.normal_x[k];
-        other.near_y[k] += near * one.normal_y[k];
-        other.far_x[k] += to_other * one.normal_x[k];
-        other.far_y[k] += to_other * one.normal_y[k];
+        const Overlap own = overlap(cosine, one.inverse_length[k], other.inverse_length[k], sigma, own_limits);
+        shared.near[k] = color * own.near;
+        shared.far_first[k] = color * own.far_first;
+        shared.far_second[k] = color * own.far_second;
       }
     }
-    at[i] = one;
   }
+  return out;
 }
 
 }  // namespace cmp::refine

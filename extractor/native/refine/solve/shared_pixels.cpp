@@ -12,15 +12,14 @@ namespace cmp::refine {
 
 namespace {
 
-// The gridlines at one marker, in their order in MarkerGridlines.
-struct GridlineNumbers {
-  std::array<Index, MARKER_GRIDLINES> at;
-  Index count;
-};
+// Whether gridline e, -1 for none, is drawn and counts.
+bool is_drawn(const GridlineSystem& system, Index e) {
+  return e >= 0 && system.weight[e] * system.lines(e, KNOWN) != 0.0;
+}
 
 // Writes gridline e at marker m into a lane.
 void fill_gridline(Index m, Index e, const GridlineSystem& system, const SharedPixelLimits& limits,
-                   Index lane, LaneGridlines& out) {
+                   std::size_t lane, LaneGridlines& out) {
   const auto lines = system.lines[e], sums = system.sums[e], contrast = system.contrasts[e];
   // the direction in which the curved gridline leaves the marker
   const double sense = system.edges(e, 0) == m ? 1.0 : -1.0;
@@ -38,54 +37,99 @@ void fill_gridline(Index m, Index e, const GridlineSystem& system, const SharedP
   out.red[lane] = part * c0;
   out.green[lane] = part * c1;
   out.blue[lane] = part * c2;
-  out.weight[lane] = system.weight[e];
   out.inverse_length[lane] = 1.0 / lines[LENGTH];
-  out.normal_x[lane] = -lines[UY] / system.variance;
-  out.normal_y[lane] = lines[UX] / system.variance;
 }
 
-// Writes the gridlines at marker m into a lane.
-GridlineNumbers fill_gridlines_at_marker(Index m, const GridlineSystem& system,
-                                         const SharedPixelLimits& limits, Index lane, MarkerGridlines& out) {
-  GridlineNumbers numbers{{}, 0};
-  for (Index k = 0; k < system.spokes.size(1); ++k) {
-    const Index e = system.spokes(m, k);
-    if (e < 0 || system.weight[e] * system.lines(e, KNOWN) == 0.0) continue;
-    fill_gridline(m, e, system, limits, lane, out[numbers.count]);
-    numbers.at[numbers.count++] = e;
+// A gridline at a marker.
+struct GridlineAtMarker {
+  Index e, other;  // the gridline, and the marker at its far end
+  bool starts;     // at the marker
+  double nx, ny;   // its normal
+
+  GridlineAtMarker(const GridlineSystem& system, Index m, Index gridline)
+      : e(gridline),
+        other(system.edges(e, system.edges(e, 0) == m ? 1 : 0)),
+        starts(system.edges(e, 0) == m),
+        nx(-system.lines(e, UY)),
+        ny(system.lines(e, UX)) {}
+
+  // The shift of a marker along the normal, of shifts (M, 2).
+  double along(View<const double, 2> shift, Index m) const { return nx * shift(m, 0) + ny * shift(m, 1); }
+  // The gradient at the marker, or at the far end.
+  double& gradient(ShiftGradients& of, bool near) const { return near == starts ? of.start[e] : of.end[e]; }
+
+  // Adds the product of the other gridline's near end and this one's far end.
+  void add_far(double value, const GridlineAtMarker& second, View<double, 2> off_diagonal) const {
+    const auto block = off_diagonal[e];
+    block[0] += value * second.nx * nx;
+    block[starts ? 1 : 2] += value * second.nx * ny;
+    block[starts ? 2 : 1] += value * second.ny * nx;
+    block[3] += value * second.ny * ny;
   }
-  return numbers;
+};
+
+// Calls act(marker, first, second, pair, lane) for all pairs of known gridlines at each marker.
+template <class Act>
+void for_pairs(const GridlineSystem& system, const Act& act) {
+  const auto spokes = system.spokes;
+  for (Index m = 0; m < spokes.size(); ++m) {
+    std::size_t pair = 0;
+    for (Index i = 0; i < spokes.size(1); ++i) {
+      for (Index j = i + 1; j < spokes.size(1); ++j, ++pair) {
+        const Index e = spokes(m, i), f = spokes(m, j);
+        if (is_drawn(system, e) && is_drawn(system, f))
+          act(m, GridlineAtMarker(system, m, e), GridlineAtMarker(system, m, f), pair);
+      }
+    }
+  }
 }
 
 }  // namespace
 
-void add_shared_pixels(const GridlineSystem& system, View<double, 2> diagonal, View<double, 2> off_diagonal,
-                       const SharedPixelLimits& limits) {
-  const Index count = system.spokes.size();
+SharedPixels::SharedPixels(const GridlineSystem& system, const SharedPixelLimits& limits) {
+  const auto count = static_cast<std::size_t>(system.spokes.size());
+  overlaps_.reserve(count / MARKER_LANES + 1);
   MarkerGridlines gridlines;
-  std::array<GridlineNumbers, MARKER_LANES> numbers;
-  for (Index start = 0; start < count; start += MARKER_LANES) {
-    const Index lanes = std::min(MARKER_LANES, count - start);
+  for (std::size_t start = 0; start < count; start += MARKER_LANES) {
     gridlines.fill({});
-    for (Index lane = 0; lane < lanes; ++lane)
-      numbers[lane] = fill_gridlines_at_marker(start + lane, system, limits, lane, gridlines);
-    accumulate_overlaps(gridlines, system.sigma, limits);
-    for (Index lane = 0; lane < lanes; ++lane) {
-      const Index m = start + lane;
-      for (Index i = 0; i < numbers[lane].count; ++i) {
-        const Index e = numbers[lane].at[i], swap = system.edges(e, 0) == m ? 0 : 1;
-        const double nx = -system.lines(e, UY), ny = system.lines(e, UX);
-        const LaneGridlines& own = gridlines[i];
-        diagonal(m, 0) += own.near_x[lane] * nx;
-        diagonal(m, 1) += own.near_x[lane] * ny;
-        diagonal(m, 2) += own.near_y[lane] * ny;
-        off_diagonal(e, 0) += own.far_x[lane] * nx;
-        off_diagonal(e, 1 + swap) += own.far_x[lane] * ny;
-        off_diagonal(e, 2 - swap) += own.far_y[lane] * nx;
-        off_diagonal(e, 3) += own.far_y[lane] * ny;
+    for (std::size_t lane = 0; lane < std::min(MARKER_LANES, count - start); ++lane) {
+      const auto m = static_cast<Index>(start + lane);
+      for (Index k = 0; k < system.spokes.size(1); ++k) {
+        const Index e = system.spokes(m, k);
+        if (is_drawn(system, e)) fill_gridline(m, e, system, limits, lane, gridlines[static_cast<std::size_t>(k)]);
       }
     }
+    overlaps_.push_back(overlaps_of(gridlines, system.sigma, limits));
   }
+}
+
+void SharedPixels::add_information(const GridlineSystem& system, View<double, 2> diagonal,
+                                   View<double, 2> off_diagonal) const {
+  for_pairs(system, [&](Index m, const GridlineAtMarker& first, const GridlineAtMarker& second, std::size_t pair) {
+    const auto lane = static_cast<std::size_t>(m) % MARKER_LANES;
+    const LaneOverlaps& shared = overlaps_[static_cast<std::size_t>(m) / MARKER_LANES][pair];
+    const double weight = std::min(system.weight[first.e], system.weight[second.e]) / system.variance;
+    const double near = weight * shared.near[lane];
+    diagonal(m, 0) += 2.0 * near * first.nx * second.nx;
+    diagonal(m, 1) += near * (first.nx * second.ny + first.ny * second.nx);
+    diagonal(m, 2) += 2.0 * near * first.ny * second.ny;
+    first.add_far(weight * shared.far_first[lane], second, off_diagonal);
+    second.add_far(weight * shared.far_second[lane], first, off_diagonal);
+  });
+}
+
+void SharedPixels::explain(const GridlineSystem& system, View<const double, 2> shift,
+                           ShiftGradients& left) const {
+  for_pairs(system, [&](Index m, const GridlineAtMarker& first, const GridlineAtMarker& second, std::size_t pair) {
+    const auto lane = static_cast<std::size_t>(m) % MARKER_LANES;
+    const LaneOverlaps& shared = overlaps_[static_cast<std::size_t>(m) / MARKER_LANES][pair];
+    const double near = shared.near[lane], far_first = shared.far_first[lane], far_second = shared.far_second[lane];
+    const double of_first = first.along(shift, m), of_second = second.along(shift, m);
+    first.gradient(left, true) -= near * of_second + far_second * second.along(shift, second.other);
+    first.gradient(left, false) -= far_first * of_second;
+    second.gradient(left, true) -= near * of_first + far_first * first.along(shift, first.other);
+    second.gradient(left, false) -= far_second * of_first;
+  });
 }
 
 }  // namespace cmp::refine
