@@ -15,9 +15,32 @@ struct LaneGridlines {
   LaneRow inverse_length;    // 1/px
 };
 
-using MarkerGridlines = std::array<LaneGridlines, MARKER_GRIDLINES>;
+// Their normals, and their weights over the variance of the noise.
+struct LaneNormals {
+  LaneRow x, y, weight;
+};
+
+// The sums over the other gridlines of their normals times the overlap of near end with near end, and of their
+// near end with this gridline's far end.
+struct LaneInformation {
+  LaneRow near_x, near_y, far_x, far_y;
+};
+
+// Values at their near and at their far ends.
+struct LaneEnds {
+  LaneRow near, far;
+};
+
+template <class Lanes>
+using AtMarkers = std::array<Lanes, MARKER_GRIDLINES>;
 
 // The overlaps of all pairs of gridlines at each marker; sigma, the blur, px.
-MarkerOverlaps overlaps_of(const MarkerGridlines& at, double sigma, const SharedPixelLimits& limits);
+MarkerOverlaps overlaps_of(const AtMarkers<LaneGridlines>& at, double sigma, const SharedPixelLimits& limits);
+
+// The information that the overlaps add; of two gridlines, the smaller weight counts.
+AtMarkers<LaneInformation> information_of(const MarkerOverlaps& overlaps, const AtMarkers<LaneNormals>& at);
+
+// The gradients at the ends of each gridline by the shifts of the others, px.
+AtMarkers<LaneEnds> gradients_of(const MarkerOverlaps& overlaps, const AtMarkers<LaneEnds>& shift);
 
 }  // namespace cmp::refine

@@ -40,46 +40,15 @@ void fill_gridline(Index m, Index e, const GridlineSystem& system, const SharedP
   out.inverse_length[lane] = 1.0 / lines[LENGTH];
 }
 
-// A gridline at a marker.
-struct GridlineAtMarker {
-  Index e, other;  // the gridline, and the marker at its far end
-  bool starts;     // at the marker
-  double nx, ny;   // its normal
-
-  GridlineAtMarker(const GridlineSystem& system, Index m, Index gridline)
-      : e(gridline),
-        other(system.edges(e, system.edges(e, 0) == m ? 1 : 0)),
-        starts(system.edges(e, 0) == m),
-        nx(-system.lines(e, UY)),
-        ny(system.lines(e, UX)) {}
-
-  // The shift of a marker along the normal, of shifts (M, 2).
-  double along(View<const double, 2> shift, Index m) const { return nx * shift(m, 0) + ny * shift(m, 1); }
-  // The gradient at the marker, or at the far end.
-  double& gradient(ShiftGradients& of, bool near) const { return near == starts ? of.start[e] : of.end[e]; }
-
-  // Adds the product of the other gridline's near end and this one's far end.
-  void add_far(double value, const GridlineAtMarker& second, View<double, 2> off_diagonal) const {
-    const auto block = off_diagonal[e];
-    block[0] += value * second.nx * nx;
-    block[starts ? 1 : 2] += value * second.nx * ny;
-    block[starts ? 2 : 1] += value * second.ny * nx;
-    block[3] += value * second.ny * ny;
-  }
-};
-
-// Calls act(marker, first, second, pair, lane) for all pairs of known gridlines at each marker.
+// Calls act(m, e, spoke, lane) for all gridlines that are drawn at the markers of a block of lanes.
 template <class Act>
-void for_pairs(const GridlineSystem& system, const Act& act) {
+void for_gridlines(const GridlineSystem& system, std::size_t block, const Act& act) {
   const auto spokes = system.spokes;
-  for (Index m = 0; m < spokes.size(); ++m) {
-    std::size_t pair = 0;
-    for (Index i = 0; i < spokes.size(1); ++i) {
-      for (Index j = i + 1; j < spokes.size(1); ++j, ++pair) {
-        const Index e = spokes(m, i), f = spokes(m, j);
-        if (is_drawn(system, e) && is_drawn(system, f))
-          act(m, GridlineAtMarker(system, m, e), GridlineAtMarker(system, m, f), pair);
-      }
+  const auto count = static_cast<std::size_t>(spokes.size());
+  for (std::size_t lane = 0; lane < MARKER_LANES && block * MARKER_LANES + lane < count; ++lane) {
+    const auto m = static_cast<Index>(block * MARKER_LANES + lane);
+    for (Index k = 0; k < spokes.size(1); ++k) {
+      if (is_drawn(system, spokes(m, k))) act(m, spokes(m, k), static_cast<std::size_t>(k), lane);
     }
   }
 }
@@ -87,49 +56,62 @@ void for_pairs(const GridlineSystem& system, const Act& act) {
 }  // namespace
 
 SharedPixels::SharedPixels(const GridlineSystem& system, const SharedPixelLimits& limits) {
-  const auto count = static_cast<std::size_t>(system.spokes.size());
-  overlaps_.reserve(count / MARKER_LANES + 1);
-  MarkerGridlines gridlines;
-  for (std::size_t start = 0; start < count; start += MARKER_LANES) {
-    gridlines.fill({});
-    for (std::size_t lane = 0; lane < std::min(MARKER_LANES, count - start); ++lane) {
-      const auto m = static_cast<Index>(start + lane);
-      for (Index k = 0; k < system.spokes.size(1); ++k) {
-        const Index e = system.spokes(m, k);
-        if (is_drawn(system, e)) fill_gridline(m, e, system, limits, lane, gridlines[static_cast<std::size_t>(k)]);
-      }
-    }
-    overlaps_.push_back(overlaps_of(gridlines, system.sigma, limits));
+  const std::size_t blocks = (static_cast<std::size_t>(system.spokes.size()) + MARKER_LANES - 1) / MARKER_LANES;
+  overlaps_.reserve(blocks);
+  AtMarkers<LaneGridlines> at;
+  for (std::size_t block = 0; block < blocks; ++block) {
+    at.fill({});
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      fill_gridline(m, e, system, limits, lane, at[k]);
+    });
+    overlaps_.push_back(overlaps_of(at, system.sigma, limits));
   }
 }
 
 void SharedPixels::add_information(const GridlineSystem& system, View<double, 2> diagonal,
                                    View<double, 2> off_diagonal) const {
-  for_pairs(system, [&](Index m, const GridlineAtMarker& first, const GridlineAtMarker& second, std::size_t pair) {
-    const auto lane = static_cast<std::size_t>(m) % MARKER_LANES;
-    const LaneOverlaps& shared = overlaps_[static_cast<std::size_t>(m) / MARKER_LANES][pair];
-    const double weight = std::min(system.weight[first.e], system.weight[second.e]) / system.variance;
-    const double near = weight * shared.near[lane];
-    diagonal(m, 0) += 2.0 * near * first.nx * second.nx;
-    diagonal(m, 1) += near * (first.nx * second.ny + first.ny * second.nx);
-    diagonal(m, 2) += 2.0 * near * first.ny * second.ny;
-    first.add_far(weight * shared.far_first[lane], second, off_diagonal);
-    second.add_far(weight * shared.far_second[lane], first, off_diagonal);
-  });
+  AtMarkers<LaneNormals> at;
+  for (std::size_t block = 0; block < overlaps_.size(); ++block) {
+    at.fill({});
+    for_gridlines(system, block, [&](Index, Index e, std::size_t k, std::size_t lane) {
+      at[k].x[lane] = -system.lines(e, UY);
+      at[k].y[lane] = system.lines(e, UX);
+      at[k].weight[lane] = system.weight[e] / system.variance;
+    });
+    const AtMarkers<LaneInformation> added = information_of(overlaps_[block], at);
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      const LaneInformation& own = added[k];
+      const double nx = at[k].x[lane], ny = at[k].y[lane];
+      const Index swap = system.edges(e, 0) == m ? 0 : 1;
+      diagonal(m, 0) += own.near_x[lane] * nx;
+      diagonal(m, 1) += own.near_x[lane] * ny;
+      diagonal(m, 2) += own.near_y[lane] * ny;
+      off_diagonal(e, 0) += own.far_x[lane] * nx;
+      off_diagonal(e, 1 + swap) += own.far_x[lane] * ny;
+      off_diagonal(e, 2 - swap) += own.far_y[lane] * nx;
+      off_diagonal(e, 3) += own.far_y[lane] * ny;
+    });
+  }
 }
 
 void SharedPixels::explain(const GridlineSystem& system, View<const double, 2> shift,
                            ShiftGradients& left) const {
-  for_pairs(system, [&](Index m, const GridlineAtMarker& first, const GridlineAtMarker& second, std::size_t pair) {
-    const auto lane = static_cast<std::size_t>(m) % MARKER_LANES;
-    const LaneOverlaps& shared = overlaps_[static_cast<std::size_t>(m) / MARKER_LANES][pair];
-    const double near = shared.near[lane], far_first = shared.far_first[lane], far_second = shared.far_second[lane];
-    const double of_first = first.along(shift, m), of_second = second.along(shift, m);
-    first.gradient(left, true) -= near * of_second + far_second * second.along(shift, second.other);
-    first.gradient(left, false) -= far_first * of_second;
-    second.gradient(left, true) -= near * of_first + far_first * first.along(shift, first.other);
-    second.gradient(left, false) -= far_second * of_first;
-  });
+  AtMarkers<LaneEnds> at;
+  for (std::size_t block = 0; block < overlaps_.size(); ++block) {
+    at.fill({});
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      const double nx = -system.lines(e, UY), ny = system.lines(e, UX);
+      const Index far = system.edges(e, system.edges(e, 0) == m ? 1 : 0);
+      at[k].near[lane] = nx * shift(m, 0) + ny * shift(m, 1);
+      at[k].far[lane] = nx * shift(far, 0) + ny * shift(far, 1);
+    });
+    const AtMarkers<LaneEnds> explained = gradients_of(overlaps_[block], at);
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      const bool starts = system.edges(e, 0) == m;
+      left.start[e] -= starts ? explained[k].near[lane] : explained[k].far[lane];
+      left.end[e] -= starts ? explained[k].far[lane] : explained[k].near[lane];
+    });
+  }
 }
 
 }  // namespace cmp::refine
