@@ -137,8 +137,8 @@ class SynthesisSolver:
             schedule: the error that a step may leave for no step to follow.
         """
         shift = np.full_like(estimate.xy, np.nan)
-        for _ in range(LIMITS.max_steps):
-            before = self._drawn(estimate)
+        for number in range(LIMITS.max_steps):
+            before = self._drawn(estimate, number == 0)
             estimate, drawing = self._full_step(view, before)
             last, shift = shift, estimate.measured - drawing.xy
             share = remaining_share(drawing.sigma, drawing.edge_px)
@@ -148,7 +148,7 @@ class SynthesisSolver:
                 break
         return estimate._replace(convergence_cov_px2=cov)
 
-    def _drawn(self, estimate: Estimate) -> Estimate:
+    def _drawn(self, estimate: Estimate, is_first: bool) -> Estimate:
         """The estimate with its pattern at the markers of the last step, and with gridlines that may bend.
 
         With wide blur, gridlines would bend instead of correcting the markers beside them.
@@ -156,7 +156,10 @@ class SynthesisSolver:
         moved = with_pattern_moved(self._topology, estimate)
         if is_blur_wide(moved.sigma, median_edge(moved.xy, self._topology.edges)):
             return _without_bending(moved)
-        return with_bending(self._topology, moved, scatter_of(self._topology, moved))
+        scatter = scatter_of(self._topology, moved)
+        if is_first and scatter == NO_SCATTER:
+            return _without_bending(moved)
+        return with_bending(self._topology, moved, scatter)
 
     def _is_settled(self, before: Estimate, after: Estimate, drawing: Synthesis) -> bool:
         """Whether the next drawing would differ from the last one by small moves of the markers only.
