@@ -170,11 +170,6 @@ class SynthesisSolver:
         read = drawing.sums[:, READ_SUM] > 0.0
         if change_px >= LIMITS.small_change * before.sigma or not read.any():
             return False
-        if is_blur_wide(before.sigma, drawing.edge_px):
-            return True
-        bend_px = np.sqrt(np.mean((after.bend[read] - before.bend[read]) ** 2))
-        if bend_px >= LIMITS.small_bend * typical_deviation(after.information):
-            return False
         return scatter_of(self._topology, after) == NO_SCATTER
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
