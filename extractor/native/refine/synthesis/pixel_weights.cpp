@@ -59,7 +59,7 @@ void fill_columns(const RowBlock& block, const PixelGeometry& geometry, const We
       const WeightParts parts = weight_parts(along, across, line, end_width);
       const float ga = keep * parts.density * parts.to_a, gb = keep * parts.density * parts.to_b;
       const float gc = ga * parts.to_b;
-      out.in_band[at + i] = keep * (parts.to_a + parts.to_b);
+      out.in_band[at + i] = keep;
       out.to_a[at + i] = ga;
       out.to_b[at + i] = gb;
       out.to_blur[at + i] = parts.z * (ga + gb);
