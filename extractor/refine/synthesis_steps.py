@@ -64,6 +64,7 @@ class SynthesisLimits(NamedTuple):
     step: StepLimits = STEP_LIMITS
     dot_gain: DotGainLimits = DOT_GAIN_LIMITS
     small_change: float = 0.05
+    frees_bends: bool = True
     small_bend: float = 2.0
 
 
@@ -138,8 +139,9 @@ class SynthesisSolver:
         """
         shift = np.full_like(estimate.xy, np.nan)
         for number in range(LIMITS.max_steps):
-            before = self._drawn(estimate, number == 0)
-            estimate, drawing = self._full_step(view, before)
+            before = self._drawn(estimate)
+            limits = LIMITS._replace(frees_bends=number > 0 or before.scatter != NO_SCATTER)
+            estimate, drawing = self._full_step(view, before, limits)
             last, shift = shift, estimate.measured - drawing.xy
             share = remaining_share(drawing.sigma, drawing.edge_px)
             cov = convergence_covariance(shift, last, drawing.sigma, share)
@@ -148,7 +150,7 @@ class SynthesisSolver:
                 break
         return estimate._replace(convergence_cov_px2=cov)
 
-    def _drawn(self, estimate: Estimate, is_first: bool) -> Estimate:
+    def _drawn(self, estimate: Estimate) -> Estimate:
         """The estimate with its pattern at the markers of the last step, and with gridlines that may bend.
 
         With wide blur, gridlines would bend instead of correcting the markers beside them.
@@ -157,8 +159,6 @@ class SynthesisSolver:
         if is_blur_wide(moved.sigma, median_edge(moved.xy, self._topology.edges)):
             return _without_bending(moved)
         scatter = scatter_of(self._topology, moved)
-        if is_first and scatter == NO_SCATTER:
-            return _without_bending(moved)
         return with_bending(self._topology, moved, scatter)
 
     def _is_settled(self, before: Estimate, after: Estimate, drawing: Synthesis) -> bool:
@@ -170,17 +170,21 @@ class SynthesisSolver:
         read = drawing.sums[:, READ_SUM] > 0.0
         if change_px >= LIMITS.small_change * before.sigma or not read.any():
             return False
+        if not before.bend.any() and not is_blur_wide(before.sigma, drawing.edge_px):
+            bend_px = np.sqrt(np.mean((after.bend[read] - before.bend[read]) ** 2))
+            if bend_px >= LIMITS.small_bend * typical_deviation(after.information):
+                return False
         return scatter_of(self._topology, after) == NO_SCATTER
 
-    def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
+    def _full_step(self, view: PyramidLevel, estimate: Estimate, limits=LIMITS) -> tuple[Estimate, Synthesis]:
         """A step from all measurements."""
         drawing = draw_pattern(view, self._topology, estimate, self.picture(view.image.shape))
-        return self._update_estimate(estimate, drawing), drawing
+        return self._update_estimate(estimate, drawing, limits), drawing
 
-    def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
+    def _update_estimate(self, estimate: Estimate, drawing: Synthesis, limits) -> Estimate:
         """The estimate after the step by the sums of the drawing."""
         topology, levels = self._topology, drawing.corrected_levels
-        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, LIMITS)
+        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, limits)
         read = SynthesisReading(*(*found[:-1], step_solution(*found[-1])))
         weights = read.weight, read.variance_ratio, read.dot_gain_offset
         how = drawing.sides, drawing.added, *weights, drawing.sigma, read.noise
