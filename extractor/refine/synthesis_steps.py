@@ -140,7 +140,7 @@ class SynthesisSolver:
         shift = np.full_like(estimate.xy, np.nan)
         for number in range(LIMITS.max_steps):
             before = self._drawn(estimate)
-            limits = LIMITS._replace(frees_bends=number > 0 or before.scatter != NO_SCATTER)
+            limits = LIMITS._replace(frees_bends=number > 0)
             estimate, drawing = self._full_step(view, before, limits)
             last, shift = shift, estimate.measured - drawing.xy
             share = remaining_share(drawing.sigma, drawing.edge_px)
