@@ -15,7 +15,6 @@ from extractor.presets import Schedule
 from extractor.refine.drawn_pattern import Synthesis, draw_pattern
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.gridline_weights import median_edge
 from extractor.refine.measure.marker_scatter import NO_SCATTER
 from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
@@ -39,7 +38,6 @@ from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 
-WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending. Chosen
 MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
 READ_SUM = 0  # column of a drawing's sums; above 0 where a gridline is read
 
@@ -55,8 +53,8 @@ class SynthesisLimits(NamedTuple):
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
             follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
             0.15 in the second step. Measured: rule "settled appearance".
-        small_bend: RMS change of the gridlines' bending in a step after which no step may follow, in deviations of a
-            marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
+        small_bend: RMS of the gridlines' bending, which the first step does not follow, after which no step may follow, in
+            deviations of a marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
     """
 
     max_steps: int = 4
@@ -64,16 +62,10 @@ class SynthesisLimits(NamedTuple):
     step: StepLimits = STEP_LIMITS
     dot_gain: DotGainLimits = DOT_GAIN_LIMITS
     small_change: float = 0.05
-    frees_bends: bool = True
     small_bend: float = 2.0
 
 
 LIMITS = SynthesisLimits()
-
-
-def is_blur_wide(sigma: float, edge_px: float) -> bool:
-    """Whether a usual edge, px, is blurred into the next by the blur, px."""
-    return sigma > WIDE_BLUR * edge_px
 
 
 class SynthesisReading(NamedTuple):
@@ -138,10 +130,9 @@ class SynthesisSolver:
             schedule: the error that a step may leave for no step to follow.
         """
         shift = np.full_like(estimate.xy, np.nan)
-        for number in range(LIMITS.max_steps):
+        for _ in range(LIMITS.max_steps):
             before = self._drawn(estimate)
-            limits = LIMITS._replace(frees_bends=number > 0)
-            estimate, drawing = self._full_step(view, before, limits)
+            estimate, drawing = self._full_step(view, before)
             last, shift = shift, estimate.measured - drawing.xy
             share = remaining_share(drawing.sigma, drawing.edge_px)
             cov = convergence_covariance(shift, last, drawing.sigma, share)
@@ -151,40 +142,34 @@ class SynthesisSolver:
         return estimate._replace(convergence_cov_px2=cov)
 
     def _drawn(self, estimate: Estimate) -> Estimate:
-        """The estimate with its pattern at the markers of the last step, and with gridlines that may bend.
-
-        With wide blur, gridlines would bend instead of correcting the markers beside them.
-        """
+        """The estimate with its pattern at the markers of the last step, and with gridlines that may bend."""
         moved = with_pattern_moved(self._topology, estimate)
-        if is_blur_wide(moved.sigma, median_edge(moved.xy, self._topology.edges)):
-            return _without_bending(moved)
-        scatter = scatter_of(self._topology, moved)
-        return with_bending(self._topology, moved, scatter)
+        return with_bending(self._topology, moved, scatter_of(self._topology, moved))
 
     def _is_settled(self, before: Estimate, after: Estimate, drawing: Synthesis) -> bool:
         """Whether the next drawing would differ from the last one by small moves of the markers only.
 
-        Blur or dot gain that has changed, gridlines that bend, and markers that scatter are drawn otherwise.
+        Blur or dot gain that has changed, bending that was not drawn, and markers that scatter are drawn otherwise.
         """
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
         read = drawing.sums[:, READ_SUM] > 0.0
         if change_px >= LIMITS.small_change * before.sigma or not read.any():
             return False
-        if not before.bend.any() and not is_blur_wide(before.sigma, drawing.edge_px):
-            bend_px = np.sqrt(np.mean((after.bend[read] - before.bend[read]) ** 2))
+        if not before.bend.any():
+            bend_px = np.sqrt(np.mean(after.bend[read] ** 2))
             if bend_px >= LIMITS.small_bend * typical_deviation(after.information):
                 return False
         return scatter_of(self._topology, after) == NO_SCATTER
 
-    def _full_step(self, view: PyramidLevel, estimate: Estimate, limits=LIMITS) -> tuple[Estimate, Synthesis]:
+    def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
         """A step from all measurements."""
         drawing = draw_pattern(view, self._topology, estimate, self.picture(view.image.shape))
-        return self._update_estimate(estimate, drawing, limits), drawing
+        return self._update_estimate(estimate, drawing), drawing
 
-    def _update_estimate(self, estimate: Estimate, drawing: Synthesis, limits) -> Estimate:
+    def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
         """The estimate after the step by the sums of the drawing."""
         topology, levels = self._topology, drawing.corrected_levels
-        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, limits)
+        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, LIMITS)
         read = SynthesisReading(*(*found[:-1], step_solution(*found[-1])))
         weights = read.weight, read.variance_ratio, read.dot_gain_offset
         how = drawing.sides, drawing.added, *weights, drawing.sigma, read.noise
@@ -204,9 +189,3 @@ class SynthesisSolver:
             levels=levels,
             dot_gain=read.dot_gain,
         )
-
-
-def _without_bending(estimate: Estimate) -> Estimate:
-    """The estimate with gridlines that may not bend."""
-    roughness, bend = np.zeros_like(estimate.roughness), np.zeros_like(estimate.bend)
-    return estimate._replace(roughness=roughness, bend=bend, scatter=NO_SCATTER)

@@ -89,17 +89,17 @@ EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradi
     variance = most * most;
     bend_variance = estimate_bend_variance(sums, gradients, prior, lines, edges, variance, limits.bending);
   }
-  if (prior.is_followed) {
+  if (has_any(prior.bend)) {
     auto response = update_without_bending(sums, gradients, prior.bend, bend_variance, variance);
     return {std::move(bend_variance), std::move(response)};
   }
   Array<double, 2> own(sums);
-  ShiftGradients own_gradients{Array<double, 1>(gradients.start.view()), Array<double, 1>(gradients.end.view())};
+  ShiftGradients own_gradients = gradients.copy();
   auto response = update_without_bending(own, own_gradients, prior.bend, bend_variance, variance);
   for (Index e = 0; e < sums.size(); ++e) {
     response(e, HELD) = 1.0;
-    sums(e, READ_AA) = own(e, READ_AA);
-    sums(e, READ_BB) = own(e, READ_BB);
+    sums(e, READ_AA) = sums(e, AA);
+    sums(e, READ_BB) = sums(e, BB);
   }
   return {std::move(bend_variance), std::move(response)};
 }

@@ -19,7 +19,7 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   Array<double, 1> dot_gain_offset =
       update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
   EliminatedBending bent = update_for_bending(
-      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending, limits.frees_bends},
+      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
       lines, edges, state.noise, rule, limits.step);
   const Array<double, 1> pardon = bending_misfit(bent.variance, contrasts, sigma, limits.step.bending);
   GridlineWeights weighed =

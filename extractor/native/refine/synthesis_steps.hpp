@@ -17,11 +17,10 @@ struct SynthesisLimits {
   MisfitRule rule;
   StepLimits step;
   DotGainLimits dot_gain;
-  bool frees_bends;
 
   template <class F>
   static SynthesisLimits read(const F& f) {
-    return {f["rule"], f["step"], f["dot_gain"], f["frees_bends"]};
+    return {f["rule"], f["step"], f["dot_gain"]};
   }
 };
 

@@ -56,7 +56,6 @@ struct BendingPrior {
   View<const double, 1> weight;     // (E,) 0 to 1, of the gridlines
   MarkerScatter scatter;
   View<const double, 2> scatter_bending;  // (E, 3), the topology's
-  bool is_followed = true;
 };
 
 inline constexpr Index HELD = 6, RESPONSE_COLUMNS = 7;  // of update_without_bending

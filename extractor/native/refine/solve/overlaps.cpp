@@ -46,7 +46,8 @@ inline void for_pairs(const Act& act) {
 
 }  // namespace
 
-MarkerOverlaps overlaps_of(const AtMarkers<LaneGridlines>& at, double sigma, const SharedPixelLimits& limits) {
+MarkerOverlaps overlaps_of(const AtMarkers<LaneGridlines>& at, double sigma,
+                           const SharedPixelLimits& limits) {
   MarkerOverlaps out;
   const SharedPixelLimits own_limits = limits;
   for_pairs([&](std::size_t i, std::size_t j, std::size_t pair) {

@@ -20,8 +20,8 @@ struct LaneNormals {
   LaneRow x, y, weight;
 };
 
-// The sums over the other gridlines of their normals times the overlap of near end with near end, and of their
-// near end with this gridline's far end.
+// The sums over the other gridlines of their normals times the overlap of near end with near end, and of
+// their near end with this gridline's far end.
 struct LaneInformation {
   LaneRow near_x, near_y, far_x, far_y;
 };

@@ -56,7 +56,8 @@ void for_gridlines(const GridlineSystem& system, std::size_t block, const Act& a
 }  // namespace
 
 SharedPixels::SharedPixels(const GridlineSystem& system, const SharedPixelLimits& limits) {
-  const std::size_t blocks = (static_cast<std::size_t>(system.spokes.size()) + MARKER_LANES - 1) / MARKER_LANES;
+  const std::size_t blocks =
+      (static_cast<std::size_t>(system.spokes.size()) + MARKER_LANES - 1) / MARKER_LANES;
   overlaps_.reserve(blocks);
   AtMarkers<LaneGridlines> at;
   for (std::size_t block = 0; block < blocks; ++block) {

@@ -33,9 +33,9 @@ using LaneRow = std::array<double, MARKER_LANES>;
 
 // The overlaps of two gridlines at each of `MARKER_LANES` markers, squared gray levels / px^2.
 struct LaneOverlaps {
-  LaneRow near;         // of near end with near end
-  LaneRow far_first;    // of the second gridline's near end with the first gridline's far end
-  LaneRow far_second;   // of the first gridline's near end with the second gridline's far end
+  LaneRow near;        // of near end with near end
+  LaneRow far_first;   // of the second gridline's near end with the first gridline's far end
+  LaneRow far_second;  // of the first gridline's near end with the second gridline's far end
 };
 
 using MarkerOverlaps = std::array<LaneOverlaps, MARKER_PAIRS>;
