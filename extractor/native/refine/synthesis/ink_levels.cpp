@@ -146,13 +146,13 @@ LightSums with_light(LightSums sums, const LightImages& images, Index at, Index 
   const float* const drawn = IS_DRAWN ? images.drawn.data() + at : nullptr;
   auto [s0, s1, s2] = sums;
   for (Index k = 0; k < 3 * count; k += 3) {
-    s0 += static_cast<double>(light[observed[k]]);
-    s1 += static_cast<double>(light[observed[k + 1]]);
-    s2 += static_cast<double>(light[observed[k + 2]]);
+    const double r = light[observed[k]], g = light[observed[k + 1]], b = light[observed[k + 2]];
     if constexpr (IS_DRAWN) {
-      s0 -= static_cast<double>(drawn[k]);
-      s1 -= static_cast<double>(drawn[k + 1]);
-      s2 -= static_cast<double>(drawn[k + 2]);
+      s0 += r - static_cast<double>(drawn[k]);
+      s1 += g - static_cast<double>(drawn[k + 1]);
+      s2 += b - static_cast<double>(drawn[k + 2]);
+    } else {
+      s0 += r, s1 += g, s2 += b;
     }
   }
   return {s0, s1, s2};
