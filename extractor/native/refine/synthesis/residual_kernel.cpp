@@ -49,8 +49,7 @@ class ResidualReader {
       fill_rows(block, first, frame, half, pixels_.rows);
       fill_weights(block, line, weights, pixels_);
       fill_values(images_, block, pixels_.rows, light, pixels_.weights.before_share, pixels_.residuals);
-      fill_projections(light, bleed, block.pixels(), pixels_);
-      accumulate_sums(pixels_, block.pixels(), sums);
+      accumulate_sums(light, bleed, block.pixels(), pixels_, sums);
       if (drawn_.is_bending[e]) accumulate_bending_sums(pixels_, block.pixels(), sums);
     }
     update_units(sums, 1.0 / sigma_);
