@@ -33,9 +33,9 @@ class alignas(64) LaneSum {
 // Adds pixels to a gridline's sums; see accumulate_sums.
 void accumulate_own_sums(const SideLight& light, const SideLight& bleed, Index count, GridlinePixels& pixels,
                          View<double, 1> sums) {
-  const auto [contrast0, contrast1, contrast2] = light.contrast;
-  const auto [step0, step1, step2] = bleed.step;
-  const auto [beyond0, beyond1, beyond2] = bleed.beyond;
+  const float contrast0 = light.contrast[0], contrast1 = light.contrast[1], contrast2 = light.contrast[2];
+  const float step0 = bleed.step[0], step1 = bleed.step[1], step2 = bleed.step[2];
+  const float beyond0 = bleed.beyond[0], beyond1 = bleed.beyond[1], beyond2 = bleed.beyond[2];
   const PixelWeights& weights = pixels.weights;
   Residuals& own = pixels.residuals;
   LaneSum aa, ab, bb, a, b, az, bz, blur, curvature, misfit, in_bands;
