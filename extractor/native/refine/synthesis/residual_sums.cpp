@@ -9,6 +9,7 @@ namespace {
 
 constexpr float FULL_DENSITY =
     2.5066283F;  // the root of 2 pi, by which the normal density is 1 on the gridline
+
 // A sum of every lane by itself, which is added up in the same order on every processor.
 class alignas(64) LaneSum {
  public:
