@@ -15,14 +15,18 @@ CMP_PART_OF_LOOP void fill_row_of_means(View<const std::uint8_t, 3> rows, Index 
   const auto pixels = static_cast<std::uint32_t>(scale * scale);
   const auto width = means.size() / 3;
   for (Index x = 0; x < width; ++x) {
-    for (Index channel = 0; channel < 3; ++channel) {
-      std::uint32_t total = 0;
-      for (Index y = 0; y < scale; ++y) {
-        const auto values = rows[y].flat();
-        for (Index k = 0; k < scale; ++k) total += light_steps[values[3 * (scale * x + k) + channel]];
+    std::uint32_t blue = pixels / 2, green = blue, red = blue;
+    for (Index y = 0; y < scale; ++y) {
+      const std::uint8_t* values = &rows(y, scale * x, 0);
+      for (Index k = 0; k < scale; ++k, values += 3) {
+        blue += light_steps[values[0]];
+        green += light_steps[values[1]];
+        red += light_steps[values[2]];
       }
-      means[3 * x + channel] = value_of_steps[(total + pixels / 2) / pixels];
     }
+    means[3 * x] = value_of_steps[blue / pixels];
+    means[3 * x + 1] = value_of_steps[green / pixels];
+    means[3 * x + 2] = value_of_steps[red / pixels];
   }
 }
 
@@ -35,7 +39,7 @@ Array<std::uint8_t, 3> block_means(View<const std::uint8_t, 3> image, Index scal
   for (Index y = 0; y < height; ++y) {
     const auto rows = image.slice(scale * y, scale * (y + 1));
     const auto means = out[y].flat();
-    if (scale == 2)  // with a known number of pixels the loop takes less than half of the time
+    if (scale == 2)  // with a known number of pixels the loop takes two thirds of the time
       fill_row_of_means(rows, 2, light_steps, value_of_steps, means);
     else if (scale == 3)
       fill_row_of_means(rows, 3, light_steps, value_of_steps, means);
