@@ -6,6 +6,7 @@ repair, virtual, quality. A warm start of the tracker goes from image over predi
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from extractor.cells.cell_mesh import build_cell_mesh
 from extractor.cells.cells import Cells, cells_with_triangles, find_cells
 from extractor.cells.region_growing import grow
-from extractor.cells.seeds import NO_DOMAIN_LIMIT, Seeds, find_seeds, has_large_domains
+from extractor.cells.seeds import NO_DOMAIN_LIMIT, Seeds, find_seeds
 from extractor.cells.triangle_fit import fit_triangles, triangles_from_moments
 from extractor.complete.image_quality import (
     measure_quality,
@@ -112,7 +113,7 @@ class Stages:
         now = time.perf_counter()
         self.timings_ms[name] = self.timings_ms.get(name, 0.0) + 1e3 * (now - self._last)
         self.results[name] = result
-        self._last = time.perf_counter()
+        self._last = now
         return result
 
 
@@ -278,7 +279,7 @@ class Extractor:
         # at a reduced scale all domains are kept, because a finer scale may resolve clutter
         limit = self._domain_limit if scale == 1 else NO_DOMAIN_LIMIT
         seeds = stages.record("seeds", find_seeds(segmentation, limit))
-        if scale > 1 and not has_large_domains(seeds):
+        if scale > 1 and not seeds.has_large_domains:
             return self._number_by_centers(pyramid, seeds, scale, stages) or Unnumbered(Reason.NO_COLOR)
         regions = stages.record("grow", grow(segmentation, seeds))
         triangles = stages.record("triangles", fit_triangles(pyramid.level(1), regions, scale))
@@ -308,7 +309,7 @@ class Extractor:
         """Stages 6 and 7: the cells' mesh and numbers, or the reason why there are none."""
         bgr = pyramid.level(1).image
         mesh = stages.record("mesh", build_cell_mesh(cells))
-        if mesh is None or int((mesh.orientation != 0).sum()) < min(MIN_FACES, self._lattice.layers**2):
+        if mesh is None or mesh.count < min(MIN_FACES, self._lattice.layers**2):
             return Unnumbered(Reason.NO_PATTERN, cells)
         numbering = stages.record("number", number_cells(bgr, cells, mesh, self._lattice))
         if numbering is None:
@@ -325,7 +326,7 @@ class Extractor:
 
 def _recognition_scales(size: tuple[int, int]) -> list[int]:
     """The scales at which recognition is tried, from coarse to fine, for an image of this width and height, px."""
-    scale = max(1, int(np.sqrt(size[0] * size[1] / WORK_PIXELS)))
+    scale = max(1, int(math.sqrt(size[0] * size[1] / WORK_PIXELS)))
     return [scale >> i for i in range(scale.bit_length())]
 
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from extractor._native import cells as native
 from extractor.cells.cells import Cells
-from extractor.numeric.delaunay import delaunay
 
 
 class CellMeshLimits(NamedTuple):
@@ -55,12 +54,14 @@ class CellMesh:
         orientation: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 no face.
         swelling: sides of the cells' triangles over the sides at which neighbours just meet, 1 to
             ``CellMeshLimits.max_swelling``.
+        count: number of faces that are markers or black cells.
     """
 
     faces: NDArray[np.int32]
     neighbours: NDArray[np.int32]
     orientation: NDArray[np.int8]
     swelling: float
+    count: int
 
 
 def build_cell_mesh(cells: Cells) -> CellMesh | None:
@@ -68,16 +69,8 @@ def build_cell_mesh(cells: Cells) -> CellMesh | None:
 
     Returns None with fewer than three cells, or with all centers on one line.
     """
-    faces, neighbours = delaunay(cells.center_px)
-    if len(faces) == 0:
-        return None
-    native.update_flipped_edges(cells.center_px, cells.ink, faces, neighbours, LIMITS)
-    swelling = native.swelling(cells.center_px, cells.ink, cells.corner_px, faces, LIMITS)
-    corner = without_swelling(cells.center_px, cells.corner_px, swelling)
-    faces, neighbours, orientation = native.classify_faces(
-        cells.center_px, cells.ink, cells.area_px, corner, faces, neighbours, LIMITS
-    )
-    return CellMesh(faces, neighbours, orientation, swelling)
+    mesh = CellMesh(*native.build_cell_mesh(cells, LIMITS))
+    return mesh if len(mesh.faces) else None
 
 
 def without_swelling(

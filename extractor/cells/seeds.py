@@ -13,8 +13,6 @@ from extractor._native import cells as native
 from extractor.image.ink_segmentation import Segmentation
 
 NO_DOMAIN_LIMIT = 1 << 62
-SAFE_AREA_PX = 20  # px^2, a cell with edges of 7 px; derived: 0.43 times 7 squared
-MAX_SMALL_SHARE = 1 / 6  # of domains below SAFE_AREA_PX; chosen
 
 
 class DomainLimits(NamedTuple):
@@ -25,11 +23,15 @@ class DomainLimits(NamedTuple):
         min_cluttered_px: px^2, of a domain in a cluttered image: a cell with edges of 5 px. Derived.
         min_solidity: area of a domain in a cluttered image, relative to the root of the determinant of its pixels'
             covariance: a triangle has 10.4, an ellipse 12.6, ragged shapes have less. Measured: rule "clutter".
+        safe_area_px: px^2, of a domain for safe recognition: a cell with edges of 7 px. Derived: 0.43 times 7 squared.
+        max_small_share: of the domains, that may be smaller. Chosen.
     """
 
     min_domain_px: int = 4
     min_cluttered_px: int = 12
     min_solidity: float = 8.0
+    safe_area_px: int = 20
+    max_small_share: float = 1 / 6
 
 
 LIMITS = DomainLimits()
@@ -58,12 +60,14 @@ class Seeds:
         runs: (R, 4) int32, the domains' horizontal runs: y, first x, last x, ink.
         domain: (R,) int32, the domain of each run.
         cluttered: there were more domains than in any pattern; only domains that may be cells are kept.
+        has_large_domains: only few domains are too small for safe recognition.
     """
 
     area_px: NDArray[np.int64]
     runs: NDArray[np.int32]
     domain: NDArray[np.int32]
-    cluttered: bool = False
+    cluttered: bool
+    has_large_domains: bool
 
     @property
     def xy(self) -> NDArray[np.int32]:
@@ -96,16 +100,9 @@ def find_seeds(segmentation: Segmentation, max_domains: int = NO_DOMAIN_LIMIT) -
         max_domains: above this number of domains, small and ragged domains are ignored, too: an image of noise has many
             times more domains than any pattern.
     """
-    runs, parent = native.find_runs(segmentation.label)
-    runs, domain, area_px, cluttered = native.find_domains(runs, parent, max_domains, LIMITS)
-    return Seeds(area_px, runs, domain, cluttered)
+    return Seeds(*native.find_domains(segmentation.label, max_domains, LIMITS))
 
 
 def domain_moments(seeds: Seeds) -> NDArray[np.float64]:
     """(N, 10) float64, the moments of domains about their seeds, as ``Regions.moments`` of grown regions."""
     return np.asarray(native.domain_moments(seeds.runs, seeds.domain, seeds.xy))
-
-
-def has_large_domains(seeds: Seeds) -> bool:
-    """Whether only few domains are too small for safe recognition."""
-    return len(seeds.area_px) > 0 and float(np.mean(seeds.area_px < SAFE_AREA_PX)) < MAX_SMALL_SHARE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,14 +11,15 @@ from numpy.typing import NDArray
 
 from extractor._native import complete as native
 from extractor.cells.cells import Cells
-from extractor.image.input import estimate_noise
+from extractor.image.input import LIMITS as NOISE_LIMITS
+from extractor.image.input import NoiseLimits
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.quality import UNKNOWN, Quality
-from extractor.refine.measure.gridline_weights import median_edge
+from extractor.refine.measure.gridline_weights import LIMITS as GRIDLINE_LIMITS
+from extractor.refine.measure.gridline_weights import GridlineWeightLimits
 
 CELLS_PER_INK = 40  # that are sampled; chosen
-SAMPLE_RADIUS = 0.08  # in edges, over which a cell's color is averaged; chosen
 # of the pixels by which the clipping of an image without numbers is measured; chosen, for time
 CLIPPING_STRIDE = 4
 
@@ -28,13 +30,34 @@ class QualityLimits(NamedTuple):
     Attributes:
         clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255. Chosen.
         dim_quantile: of the cells' light, that is the dimmest; the brightest are as many. Chosen.
+        sample_radius: in edges, over which a cell's color is averaged. Chosen.
+        noise: of the estimate of the noise.
+        gridlines: with the least median length of the edges.
     """
 
     clipped_value: float = 253.0
     dim_quantile: float = 0.05
+    sample_radius: float = 0.08
+    noise: NoiseLimits = NOISE_LIMITS
+    gridlines: GridlineWeightLimits = GRIDLINE_LIMITS
 
 
 LIMITS = QualityLimits()
+
+
+class CellFigures(NamedTuple):
+    """The figures at the middles of cells; the floats are NaN where no cell was measured.
+
+    Attributes:
+        contrast, clipping, evenness: as in ``Quality``.
+        one, other: the two inks that differ least, as indices into ``COLORS``.
+    """
+
+    contrast: float
+    one: int
+    other: int
+    clipping: float
+    evenness: float
 
 
 class SampledCells(NamedTuple):
@@ -82,9 +105,8 @@ def measure_quality(
         edges: (E, 2) the layout's edges.
         blur_px: sigma of the blur.
     """
-    edge_px = median_edge(xy_px, edges)
-    found = _quality_at(view, native.centers(xy_px, cells.corners), cells.color, edge_px)
-    return _quality(found, blur_px, estimate_noise(view.image, xy_px, cells.corners), edge_px)
+    found, noise, edge_px = native.measure_numbered(view, cells, xy_px, edges, LIMITS)
+    return _quality(CellFigures(*found), blur_px, noise, edge_px)
 
 
 def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None, has_pattern: bool) -> Quality:
@@ -102,19 +124,12 @@ def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None, has
         return replace(UNKNOWN, clipping=clipping)
     color = (cells.ink - 1).astype(np.uint8)
     chosen = _spread(color)
-    found = _quality_at(view, np.ascontiguousarray(cells.center_px[chosen]), color[chosen], cells.edge_px)
-    edge_px = cells.edge_px if has_pattern else np.nan
-    return replace(_quality(found, np.nan, np.nan, edge_px), clipping=clipping)
+    center_px = np.ascontiguousarray(cells.center_px[chosen])
+    found = CellFigures(*native.measure_cells(view, center_px, color[chosen], cells.edge_px, LIMITS))
+    edge_px = cells.edge_px if has_pattern else math.nan
+    return replace(_quality(found, math.nan, math.nan, edge_px), clipping=clipping)
 
 
-def _quality_at(
-    view: PyramidLevel, center_px: NDArray[np.float64], color: NDArray[np.uint8], edge_px: float
-) -> NDArray[np.float64]:
-    return np.asarray(native.measure(view, center_px, color, SAMPLE_RADIUS * edge_px, LIMITS))
-
-
-def _quality(found: NDArray[np.float64], blur_px: float, noise: float, edge_px: float) -> Quality:
-    """``found`` (5,): contrast, the two inks, clipping and evenness."""
-    inks = ("", "") if np.isnan(found[0]) else (COLORS[int(found[1])], COLORS[int(found[2])])
-    contrast, clipping, evenness = float(found[0]), float(found[3]), float(found[4])
-    return Quality(float(blur_px), float(noise), contrast, inks, clipping, evenness, edge_px)
+def _quality(found: CellFigures, blur_px: float, noise: float, edge_px: float) -> Quality:
+    inks = ("", "") if math.isnan(found.contrast) else (COLORS[found.one], COLORS[found.other])
+    return Quality(blur_px, noise, found.contrast, inks, found.clipping, found.evenness, edge_px)

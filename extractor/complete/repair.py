@@ -11,26 +11,23 @@ combined.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import complete as native
-from extractor.complete.consistency_filter import reject_inconsistent_markers
+from extractor.complete.consistency_filter import LIMITS as CONSISTENCY_LIMITS
+from extractor.complete.consistency_filter import ConsistencyLimits
 from extractor.complete.layer_arcs import LIMITS as LAYER_LIMITS
 from extractor.complete.layer_arcs import LayerLimits
-from extractor.complete.uncertain_markers import find_uncertain_markers
+from extractor.complete.uncertain_markers import LIMITS as UNCERTAIN_LIMITS
+from extractor.complete.uncertain_markers import UncertainLimits
 from extractor.layout.lattice_tables import Lattice
 from extractor.layout.neighbour_tables import LIMITS as NEIGHBOUR_MAP_LIMITS
 from extractor.layout.neighbour_tables import NeighbourMapLimits
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.estimate import RefinedMarkers
-from extractor.result import Status
-
-# native/complete/repair.cpp has the numbers of ``Status``, too
-MEASURED = np.uint8(Status.MEASURED)
 
 
 class RepairLimits(NamedTuple):
@@ -55,6 +52,8 @@ class RepairLimits(NamedTuple):
             `python -m benchmarks.calibration` prints z of repaired markers.
         layers: limits of a layer's quadratic.
         maps: limits of the predictions by neighbours.
+        consistency: limits of markers that do not contradict their neighbours.
+        uncertain: limits of uncertain markers.
     """
 
     mild_support: int = 10
@@ -66,28 +65,14 @@ class RepairLimits(NamedTuple):
     mild_error: float = 1.6
     layers: LayerLimits = LAYER_LIMITS
     maps: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS
+    consistency: ConsistencyLimits = CONSISTENCY_LIMITS
+    uncertain: UncertainLimits = UNCERTAIN_LIMITS
 
 
 LIMITS = RepairLimits()
 
 
-class UnrepairedMarkers(NamedTuple):
-    """M markers before repair.
-
-    Attributes:
-        xy_px, cov_px2: (M, 2) and (M, 2, 2) float64, NaN where lost; they are written.
-        uncertain: (M,) bool.
-        edge_px: (M,) float64, the edge at each marker.
-    """
-
-    xy_px: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
-    uncertain: NDArray[np.bool_]
-    edge_px: NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class RepairedMarkers:
+class RepairedMarkers(NamedTuple):
     """Markers after repair.
 
     Attributes:
@@ -111,10 +96,4 @@ def repair_markers(
         places: the markers before refinement.
         size: width and height of the image, px; no marker is reported outside the image.
     """
-    kept = reject_inconsistent_markers(refined, places, lattice, size)
-    uncertain, any_uncertain = find_uncertain_markers(kept.cov_px2, kept.edge_px)
-    if kept.is_complete and not any_uncertain:
-        return RepairedMarkers(kept.xy_px, kept.cov_px2, np.isfinite(kept.xy_px[:, 0]) * MEASURED)
-    markers = UnrepairedMarkers(kept.xy_px, kept.cov_px2, uncertain, kept.edge_px)
-    status = native.fill_lost_markers(markers, lattice.ring_tables, size, LIMITS)
-    return RepairedMarkers(kept.xy_px, kept.cov_px2, status)
+    return RepairedMarkers(*native.repair_markers(refined, places, lattice.ring_tables, size, LIMITS))

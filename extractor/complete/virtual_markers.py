@@ -16,8 +16,8 @@ from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
 from extractor.refine.measure.marker_scatter import MarkerScatter
-from extractor.refine.synthesis.gridlines import local_maps
-from extractor.result import Status
+from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
+from extractor.refine.synthesis.gridlines import GridlineLimits
 
 
 class VirtualLimits(NamedTuple):
@@ -26,30 +26,15 @@ class VirtualLimits(NamedTuple):
     Attributes:
         max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt. Chosen.
         bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord. Chosen.
+        gridlines: of the maps between the markers.
     """
 
     max_measured_offset: float = 0.08
     bend_uncertainty: float = 0.05
+    gridlines: GridlineLimits = GRIDLINE_LIMITS
 
 
 LIMITS = VirtualLimits()
-
-
-class GridlineEnds(NamedTuple):
-    """The M markers between which virtual ones lie.
-
-    Attributes:
-        xy_px, cov_px2: (M, 2) and (M, 2, 2) float64.
-        known: (M,) bool.
-        maps: (M, 2, 5) float64, the local map at each marker.
-        scatter: of the markers.
-    """
-
-    xy_px: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
-    known: NDArray[np.bool_]
-    maps: NDArray[np.float64]
-    scatter: MarkerScatter
 
 
 class VirtualMarkers(NamedTuple):
@@ -77,12 +62,4 @@ def locate_virtual_markers(
         points: (E, m, 3) float64, measured x and y (px) and their variance across the gridline (px^2), NaN for none.
         scatter: of the markers; with scatter, the gridlines curve by the map's second derivatives.
     """
-    if points.shape[1] == 0:
-        return VirtualMarkers(
-            points[..., :2], np.empty((len(points), 0, 2, 2)), np.empty((len(points), 0), np.uint8)
-        )
-    maps = local_maps(
-        repaired.xy_px, topology.ring_markers, topology.ring_vectors, topology.derivative_stencil
-    )
-    ends = GridlineEnds(repaired.xy_px, repaired.cov_px2, repaired.status != Status.LOST, maps, scatter)
-    return VirtualMarkers(*native.locate_on_edges(ends, topology, points, LIMITS))
+    return VirtualMarkers(*native.locate_on_edges(repaired, scatter, topology, points, LIMITS))

@@ -74,12 +74,5 @@ def find_hues(weight: NDArray[np.float64], nominal_deg: NDArray[np.float64]) -> 
     2 degrees. White balance and colored light shift hues; shifts end at ``reach_deg``, so that no ink is taken for
     another.
     """
-    if not weight.any():
-        return None
-    shift, found = native.hue_shifts(weight, nominal_deg, LIMITS)
-    return (nominal_deg + shift) % 360 if found else None
-
-
-def ink_of_hue(hues_deg: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """(180,) uint8: the ink (1, 2, 3) with the nearest of the hues (3,), 0 where all are 60 degrees or more away."""
-    return np.asarray(native.ink_of_hue(hues_deg, LIMITS))
+    hues_deg, found = native.find_hues(weight, nominal_deg, LIMITS)
+    return hues_deg if found else None

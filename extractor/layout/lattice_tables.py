@@ -109,11 +109,6 @@ class Lattice:
         return cells_at(places.reshape(-1, 2), self).reshape(-1, 6)
 
     @cached_property
-    def cells_per_marker(self) -> NDArray[np.int64]:
-        """(M,) int64, how many colored cells meet at each marker."""
-        return np.bincount(self.corner_ids.ravel(), minlength=len(self.marker_mm))
-
-    @cached_property
     def layout_cells(self) -> LayoutCells:
         """The colored cells as a record for compiled functions."""
         return LayoutCells(

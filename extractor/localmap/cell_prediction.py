@@ -8,11 +8,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from extractor._native import localmap as native
-
 
 class CellPredictionLimits(NamedTuple):
     """Limits of the prediction of down-cells.
@@ -31,34 +26,3 @@ class CellPredictionLimits(NamedTuple):
 
 
 LIMITS = CellPredictionLimits()
-
-
-class KnownCells(NamedTuple):
-    """The K cells that predict.
-
-    Attributes:
-        cells: (K,) int64, the cells of the image.
-        basis: (K, 2, 2) float64, px per axial step.
-        radius_px: (K,) float64, over which the cell's color is sampled.
-        level: (K,) float64, the sum of its channels, NaN outside the image.
-    """
-
-    cells: NDArray[np.int64]
-    basis: NDArray[np.float64]
-    radius_px: NDArray[np.float64]
-    level: NDArray[np.float64]
-
-
-def lattice_bases(
-    center: NDArray[np.float64], axial: NDArray[np.int32]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The local bases of the lattice, by least squares over the six neighbours of each cell.
-
-    Args:
-        center: (N, 2) px; axial: (N, 2) int32, ``UNKNOWN_AXIAL`` for unknown.
-
-    Returns:
-        (K,) int64, the cells with enough neighbours, and (K, 2, 2) float64, px per axial step at each.
-    """
-    known, basis = native.lattice_bases(center, axial, LIMITS)
-    return known, basis

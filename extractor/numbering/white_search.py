@@ -16,10 +16,11 @@ from extractor._native import numbering as native
 from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.cell_prediction import LIMITS as PREDICTION_LIMITS
-from extractor.localmap.cell_prediction import CellPredictionLimits, lattice_bases
+from extractor.localmap.cell_prediction import CellPredictionLimits
 from extractor.numbering.white_cell import LIMITS as WHITE_CELL_LIMITS
 from extractor.numbering.white_cell import WhiteCellLayout, WhiteCellLimits
-from extractor.numbering.whiteness import measure_inks
+from extractor.numbering.whiteness import LIMITS as WHITENESS_LIMITS
+from extractor.numbering.whiteness import WhitenessLimits
 
 
 class WhiteSearchLimits(NamedTuple):
@@ -32,7 +33,7 @@ class WhiteSearchLimits(NamedTuple):
         max_white_candidates: places tried in a ring, the brightest. Chosen.
         min_weakest_channel: least whiteness. Chosen.
         min_weakest_channel_far: the same where no walked cell touches the place. Chosen.
-        cell, prediction: of the modules that do these steps.
+        cell, prediction, whiteness: of the modules that do these steps.
     """
 
     min_white_ratio: float = 0.75
@@ -41,6 +42,7 @@ class WhiteSearchLimits(NamedTuple):
     min_weakest_channel_far: float = 0.75
     cell: WhiteCellLimits = WHITE_CELL_LIMITS
     prediction: CellPredictionLimits = PREDICTION_LIMITS
+    whiteness: WhitenessLimits = WHITENESS_LIMITS
 
 
 LIMITS = WhiteSearchLimits()
@@ -71,6 +73,7 @@ class _WhiteCandidates(NamedTuple):
     """P bright places, the brightest first.
 
     Attributes:
+        known: number of the walked cells with enough neighbours for a prediction.
         ring: the ring around the known cells in which they were found, -1 if none was found.
         cell: (P, N) int32, the layout's cell of each cell of the image, or -1.
         inside: (P,) int64, how many known cells lie in the layout; 0 where the white cell is not there.
@@ -79,6 +82,7 @@ class _WhiteCandidates(NamedTuple):
         fits: (P,) bool, hardly any known cell lies outside the layout.
     """
 
+    known: int
     ring: int
     cell: NDArray[np.int32]
     inside: NDArray[np.int64]
@@ -101,25 +105,19 @@ def placements_by_white_cell(
         axial: (N, 2) int32, the cells' axial coordinates, up to rotations and translations; ``UNKNOWN_AXIAL`` for cells
             not walked to.
     """
-    center = cells.center_px
-    index, basis = lattice_bases(center, axial)
-    # more cells than the layout has do not fit anywhere
-    if len(index) == 0 or len(index) - len(lattice.ink) > PREDICTION_LIMITS.max_outside_share * len(index):
-        return []
-    known, inks = measure_inks(image, center, cells.area_px, cells.ink, index, basis)
-    layout = WhiteCellLayout(
-        lattice.layers, lattice.cell_lookup, *lattice.white_cell_frame, lattice.center_mm
-    )
-    found = _WhiteCandidates(*native.search_white_cell(image, center, axial, known, inks, layout, LIMITS))
+    frame = lattice.white_cell_frame
+    layout = WhiteCellLayout(lattice.layers, lattice.cell_lookup, *frame, lattice.center_mm)
+    found = _WhiteCandidates(*native.search_white_cell(image, cells, axial, layout, LIMITS))
     return [
         LayoutPlacement(
             found.cell[n],
-            int(found.inside[n]),
-            len(index) - int(found.inside[n]),
+            inside,
+            found.known - inside,
             int(found.missing[n]),
             bool(found.fits[n]),
             found.center_px[n],
             found.ring == 0,
         )
-        for n in np.flatnonzero(found.inside)
+        for n, inside in enumerate(found.inside.tolist())
+        if inside > 0
     ]

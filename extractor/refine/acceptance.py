@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import markers as native
-from extractor.numbering.marker_places import MAX_PLACE_ERROR
-from extractor.refine.estimate import StartPlaces
+from extractor.layout.topology import Topology
+from extractor.numbering.marker_places import MAX_PLACE_ERROR, InitialMarkers
+from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import LIMITS as BENDING_LIMITS
 from extractor.refine.refinement_step import PRIOR_PX
 from extractor.refine.solve.fisher_information import LIMITS as INFORMATION_LIMITS
-from extractor.refine.solve.fisher_information import Information, InformationLimits
+from extractor.refine.solve.fisher_information import InformationLimits
 
 
 class AcceptanceLimits(NamedTuple):
@@ -66,75 +67,51 @@ LIMITS = AcceptanceLimits()
 HIDDEN_MARKER_LIMITS = HiddenMarkerLimits()
 
 
-def accepted_markers(
-    measured: NDArray[np.float64],
-    information: Information,
-    bend_variance: NDArray[np.float64],
-    edges: NDArray[np.int32],
-    spokes: NDArray[np.int32],
-    places: StartPlaces,
-    selected: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+class FinalLimits(NamedTuple):
+    """Limits of the markers after the last step.
+
+    Attributes:
+        unexplained_noise_ratio: noise of the drawing over that of the pixels, above which the drawing explains too
+            little to move a marker far. Chosen.
+        acceptance: of accepted markers.
+        hidden: of markers that dirt hides.
+    """
+
+    unexplained_noise_ratio: float = 3.0
+    acceptance: AcceptanceLimits = LIMITS
+    hidden: HiddenMarkerLimits = HIDDEN_MARKER_LIMITS
+
+
+FINAL_LIMITS = FinalLimits()
+
+
+class FinalMarkers(NamedTuple):
+    """The M markers after the tests.
+
+    Attributes:
+        xy_px, cov_px2: (M, 2) and (M, 2, 2), NaN where not accepted.
+        unaccepted: (M,) bool, the markers with a start that are not accepted, or that the image shows little.
+        all_accepted: there is none of these.
+    """
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    unaccepted: NDArray[np.bool_]
+    all_accepted: bool
+
+
+def accept_markers(estimate: Estimate, places: InitialMarkers, topology: Topology) -> FinalMarkers:
     """The markers that lie near their start place with a small deviation.
 
+    Dirt on some gridlines of a marker moves the others, too, and adds to the covariance. Where the drawing does not
+    explain the image, markers far from their start are not accepted.
+
     Args:
-        measured: (M, 2) px.
-        information: about them.
-        bend_variance: (E,) px^2.
-        edges, spokes: (E, 2) and (M, 6).
+        estimate: after the last step.
         places: before refinement.
-        selected: (M,) bool, the markers to test; no other is accepted.
-
-    Returns:
-        (M, 2) px and (M, 2, 2) px^2: markers and covariances, NaN where not accepted.
+        topology: of the layout.
     """
-    gridlines = bend_variance, edges, spokes
-    xy, cov = native.accepted_markers(measured, information, *gridlines, places, selected, LIMITS)
-    return xy, cov
-
-
-def add_dirt_variance(
-    cov: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    spokes: NDArray[np.int32],
-    edge: NDArray[np.float64],
-) -> None:
-    """Add the variance by dirt to the covariances: dirt on some gridlines moves the others, too.
-
-    Args:
-        cov: (M, 2, 2) px^2, written.
-        weight: (E,) 0 to 1, of the gridlines; 0 for gridlines that were not measured.
-        spokes: (M, 6) the gridlines at each marker.
-        edge: (M,) px, the length of the edges at each marker.
-    """
-    native.add_dirt_variance(cov, weight, spokes, edge, HIDDEN_MARKER_LIMITS)
-
-
-def update_unaccepted_markers(
-    xy: NDArray[np.float64],
-    cov: NDArray[np.float64],
-    reliable: NDArray[np.float64],
-    start: NDArray[np.float64],
-    edge: NDArray[np.float64],
-    unexplained: bool,
-    dot_gain: float,
-) -> tuple[NDArray[np.bool_], bool]:
-    """The markers that are neither accepted nor reliable.
-
-    Args:
-        xy, cov: (M, 2) px and (M, 2, 2) px^2, NaN where not accepted. Where all is ``unexplained``, markers far from
-            their start become NaN.
-        reliable: (M, 2) px, NaN where the image shows a marker little.
-        start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
-        unexplained: the drawing does not explain the image.
-        dot_gain: px.
-
-    Returns:
-        (M,) bool, the markers with a start that are not accepted or not reliable; and whether there are any.
-    """
-    markers, places = (xy, cov, reliable), (start, edge)
-    out = native.update_unaccepted_markers(*markers, *places, unexplained, dot_gain, HIDDEN_MARKER_LIMITS)
-    return out, bool(out.any())
+    return FinalMarkers(*native.accept_markers(estimate, places, topology, FINAL_LIMITS))
 
 
 def update_lost_markers(
@@ -151,7 +128,7 @@ def update_lost_markers(
         xy, cov: (M, 2) px and (M, 2, 2) px^2; unaccepted markers far from where they are predicted become NaN.
         unaccepted: (M,) bool.
         predicted: (M, 2) px, the markers by their neighbours.
-        start, edge: (M, 2) px, (M,) px, as in ``StartPlaces``.
+        start, edge: (M, 2) px, (M,) px, as in ``InitialMarkers``.
 
     Returns:
         (M,) bool, the markers with a start that are not accepted.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -82,28 +82,8 @@ class RefinedMarkers:
     scatter: MarkerScatter
 
 
-class PatternState(NamedTuple):
-    """The estimated places of the pattern: the part of an ``Estimate`` for compiled functions.
-
-    Attributes:
-        xy, hidden, maps, roughness, bend, sigma, noise, dot_gain, scatter: as in ``Estimate``.
-        weight: (E,) 0 to 1, the weights of the gridlines in the last step.
-    """
-
-    xy: NDArray[np.float64]
-    hidden: NDArray[np.bool_]
-    maps: NDArray[np.float64]
-    roughness: NDArray[np.float64]
-    bend: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    sigma: float
-    noise: float
-    dot_gain: float
-    scatter: MarkerScatter
-
-
 class Estimate(NamedTuple):
-    """The current estimate. Places are px in the image at the scale of the step.
+    """The current estimate. Places are px in the image at the scale of the step. Compiled functions take a part of it.
 
     Attributes:
         xy: (M, 2) places at which the pattern is drawn. Markers that the image hardly shows or does not show
@@ -146,11 +126,6 @@ class Estimate(NamedTuple):
     scatter: MarkerScatter = NO_SCATTER
     convergence_cov_px2: NDArray[np.float64] | None = None
 
-    def pattern_state(self) -> PatternState:
-        """The part for compiled functions."""
-        where = self.xy, self.hidden, self.maps, self.roughness, self.bend
-        return PatternState(*where, self.weight, self.sigma, self.noise, self.dot_gain, self.scatter)
-
 
 class EdgeContrasts(NamedTuple):
     """The change of color across the gridlines; the change does not depend on shifts of a gridline by a pixel.
@@ -166,27 +141,6 @@ class EdgeContrasts(NamedTuple):
     clearance: NDArray[np.float64]
 
 
-class StartPlaces(NamedTuple):
-    """Markers before refinement: the part of ``InitialMarkers`` for compiled functions.
-
-    Attributes:
-        xy_px: (M, 2) px at the scale of the step, NaN where there is none.
-        edge_px: (M,) the mean length of the edges at each marker, px, NaN where there is none.
-        agreed: (M,) bool, the triangles found at the marker meet.
-        is_intact: (M,) bool, these are all triangles that the pattern has there.
-    """
-
-    xy_px: NDArray[np.float64]
-    edge_px: NDArray[np.float64]
-    agreed: NDArray[np.bool_]
-    is_intact: NDArray[np.bool_]
-
-
 def places_in_view(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
     """Places of the full image in a reduced image."""
-    return replace(places, xy_px=view.to_level(places.xy_px), edge_px=places.edge_px / view.scale)
-
-
-def start_places(places: InitialMarkers) -> StartPlaces:
-    """The part of the places for compiled functions."""
-    return StartPlaces(places.xy_px, places.edge_px, places.agreed, places.is_intact)
+    return places._replace(xy_px=view.to_level(places.xy_px), edge_px=places.edge_px / view.scale)

@@ -8,7 +8,6 @@ gridline to the next.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from extractor._native import markers as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numbering.marker_places import MAX_PLACE_ERROR, InitialMarkers
-from extractor.refine.estimate import Estimate, start_places
+from extractor.refine.estimate import Estimate
 from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
 from extractor.refine.synthesis.gridlines import GridlineLimits
 
@@ -75,14 +74,10 @@ def correct_outliers(
         profile_weight: (E,) 0 to 1, similarity of gridlines to the pattern.
         places: of the full image.
     """
-    suspect = native.suspect_markers(profile_weight, estimate.weight, topology.spokes, LIMITS)
-    if not suspect.any():
-        return estimate, places
-    start = start_places(places)
     found, measured, reliable, xy, agreed, is_intact = native.correct_outliers(
-        topology, estimate, start, suspect, view.scale, LIMITS
+        topology, estimate, places, profile_weight, view.scale, LIMITS
     )
     if not found:
         return estimate, places
     estimate = estimate._replace(measured=measured, reliable=reliable)
-    return estimate, replace(places, xy_px=xy, agreed=agreed, is_intact=is_intact)
+    return estimate, places._replace(xy_px=xy, agreed=agreed, is_intact=is_intact)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from extractor.refine.refinement_step import (
     MisfitRule,
     StepLimits,
     StepSolution,
-    step_solution,
     with_solution,
 )
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
@@ -61,13 +60,13 @@ class ProfileStep(NamedTuple):
         profile_weight: (E,) 0 to 1, similarity of each gridline to the pattern.
         weight: (E,) 0 to 1, with which it was used.
         dot_gain: px.
-        solution: the markers after the step.
+        solution: the markers after the step, the fields of ``StepSolution``.
     """
 
     profile_weight: NDArray[np.float64]
     weight: NDArray[np.float64]
     dot_gain: float
-    solution: StepSolution
+    solution: tuple[Any, ...]
 
 
 def profile_step(
@@ -94,8 +93,7 @@ def profile_step(
     Returns:
         The estimate after the round, and (E,) 0 to 1, similarity of gridlines to the pattern.
     """
-    state = estimate.pattern_state()
-    found = native.profile_step(view, lines, contrasts, state, topology, stations, LIMITS)
-    step = ProfileStep(*(*found[:-1], step_solution(*found[-1])))
-    others = {"weight": step.weight, "dot_gain": step.dot_gain}
-    return with_solution(estimate, step.solution, **others), step.profile_weight
+    given = view, lines, contrasts, estimate, topology, stations
+    step = ProfileStep(*native.profile_step(*given, LIMITS))
+    after = with_solution(estimate, StepSolution(*step.solution), weight=step.weight, dot_gain=step.dot_gain)
+    return after, step.profile_weight

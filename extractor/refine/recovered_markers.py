@@ -17,7 +17,7 @@ from extractor.layout.topology import Topology
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.acceptance import HIDDEN_MARKER_LIMITS, AcceptanceLimits, HiddenMarkerLimits
 from extractor.refine.acceptance import LIMITS as ACCEPTANCE_LIMITS
-from extractor.refine.estimate import EdgeContrasts, Estimate, start_places
+from extractor.refine.estimate import EdgeContrasts, Estimate
 from extractor.refine.profile_rounds import LIMITS as PROFILE_LIMITS
 from extractor.refine.profile_rounds import ProfileLimits
 from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
@@ -78,6 +78,5 @@ def fill_recovered_markers(
         lost: (M,) bool.
         xy, cov: (M, 2) px and (M, 2, 2) px^2, written; NaN where a lost marker is not accepted, or far from its place.
     """
-    state, start = estimate.pattern_state(), start_places(places)
     markers = _LostMarkers(lost, xy, cov)
-    native.fill_recovered_markers(view, state, contrasts, start, topology, markers, LIMITS)
+    native.fill_recovered_markers(view, estimate, contrasts, places, topology, markers, LIMITS)

@@ -80,12 +80,12 @@ class ExtrapolatedPattern(NamedTuple):
 
 
 class StepSolution(NamedTuple):
-    """Markers and gridlines after a step; fields as in ``Estimate``."""
+    """Markers and gridlines after a step; fields as in ``Estimate``, and the two blocks of its information."""
 
     measured: NDArray[np.float64]
     reliable: NDArray[np.float64]
     bend: NDArray[np.float64]
-    information: Information
+    blocks: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def extrapolate_pattern(xy: NDArray[np.float64], topology: Topology) -> ExtrapolatedPattern:
@@ -95,7 +95,8 @@ def extrapolate_pattern(xy: NDArray[np.float64], topology: Topology) -> Extrapol
 
 def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
     """The estimate with its pattern at the markers of the last step."""
-    return estimate._replace(**extrapolate_pattern(estimate.reliable, topology)._asdict())
+    moved = extrapolate_pattern(estimate.reliable, topology)
+    return estimate._replace(xy=moved.xy, hidden=moved.hidden, maps=moved.maps)
 
 
 def scatter_of(topology: Topology, estimate: Estimate) -> MarkerScatter:
@@ -118,16 +119,12 @@ def gridlines_of(topology: Topology, estimate: Estimate) -> NDArray[np.float64]:
     return np.asarray(gridlines(*where, topology.edges, topology.edge_vectors, estimate.scatter.share))
 
 
-def step_solution(
-    measured: NDArray[np.float64],
-    reliable: NDArray[np.float64],
-    bend: NDArray[np.float64],
-    blocks: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> StepSolution:
-    """The solution of native arrays."""
-    return StepSolution(measured, reliable, bend, Information(*blocks))
-
-
 def with_solution(estimate: Estimate, solution: StepSolution, **others: Any) -> Estimate:
     """The estimate after a step, and with other new fields."""
-    return estimate._replace(**solution._asdict(), **others)
+    return estimate._replace(
+        measured=solution.measured,
+        reliable=solution.reliable,
+        bend=solution.bend,
+        information=Information(*solution.blocks),
+        **others,
+    )

@@ -7,8 +7,7 @@ One such step is nearly enough.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,8 @@ from extractor.layout.topology import Topology
 from extractor.numbering.marker_places import AGREED_DEVIATION, InitialMarkers
 from extractor.presets import SCHEDULES, Preset
 from extractor.refine.acceptance import (
-    accepted_markers,
-    add_dirt_variance,
+    accept_markers,
     update_lost_markers,
-    update_unaccepted_markers,
 )
 from extractor.refine.estimate import (
     Appearance,
@@ -30,7 +27,6 @@ from extractor.refine.estimate import (
     Estimate,
     RefinedMarkers,
     places_in_view,
-    start_places,
 )
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
@@ -57,8 +53,6 @@ SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at
 MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
-# Noise of the drawing over that of the pixels, above which the drawing explains too little to move a marker far.
-UNEXPLAINED_NOISE_RATIO = 3.0
 
 
 class FullScaleLimits(NamedTuple):
@@ -82,7 +76,14 @@ class Refiner:
         self._virtual = virtual_per_edge
         self._schedule = SCHEDULES[preset]
         self._synthesis_solver = SynthesisSolver(topology)
-        self._every_marker = np.ones(len(topology.spokes), np.bool_)
+        markers, edges = len(topology.spokes), len(topology.edges)
+        self._unmeasured: dict[str, Any] = {
+            "information": Information(np.zeros((markers, 3)), np.zeros((edges, 4))),
+            "roughness": np.zeros(markers),
+            "bend_variance": np.zeros(edges),
+            "bend": np.zeros((edges, 2)),
+            "weight": np.ones(edges),
+        }
 
     def __call__(
         self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None = None
@@ -140,7 +141,6 @@ class Refiner:
             The estimate, the contrasts across the gridlines, and the places without outliers.
         """
         topology = self._topology
-        markers, edges = len(topology.spokes), len(topology.edges)
         xy, hidden, maps = extrapolate_pattern(view.to_level(start), topology)
         look = before or initial_appearance(view, topology, xy)
         estimate = Estimate(
@@ -153,11 +153,7 @@ class Refiner:
             noise=look.noise,
             levels=look.levels,
             pixel_noise=look.pixel_noise,
-            information=Information(np.zeros((markers, 3)), np.zeros((edges, 4))),
-            roughness=np.zeros(markers),
-            bend_variance=np.zeros(edges),
-            bend=np.zeros((edges, 2)),
-            weight=np.ones(edges),
+            **self._unmeasured,
         )
         lines = gridlines_of(topology, estimate)
         contrasts = update_edge_contrasts(view, topology, estimate, lines)
@@ -185,7 +181,7 @@ class Refiner:
         places = places_in_view(view, places)
         if estimate.dot_gain != 0.0:
             xy = markers_without_dot_gain(places.xy_px, self._topology.cells, estimate.dot_gain)
-            places = replace(places, xy_px=xy)
+            places = places._replace(xy_px=xy)
         estimate = self._synthesis_solver.steps(view, estimate, self._schedule)
         return self._accept_or_recover(view, estimate, contrasts, places)
 
@@ -195,16 +191,11 @@ class Refiner:
         """The accepted markers; where the drawing does not explain the image, as in glare, the markers by many
         profiles.
         """
-        xy, cov = self._accepted_markers(estimate, places)
-        unexplained = estimate.noise > UNEXPLAINED_NOISE_RATIO * estimate.pixel_noise
-        start = places.xy_px, places.edge_px
-        unaccepted, some = update_unaccepted_markers(
-            xy, cov, estimate.reliable, *start, unexplained, estimate.dot_gain
-        )
-        if not some:
+        xy, cov, unaccepted, all_accepted = accept_markers(estimate, places, self._topology)
+        if all_accepted:
             return self._refined_markers(view, estimate, xy, cov, ~unaccepted, places)
         moved = with_pattern_moved(self._topology, estimate)
-        lost = update_lost_markers(xy, cov, unaccepted, moved.xy, *start)
+        lost = update_lost_markers(xy, cov, unaccepted, moved.xy, places.xy_px, places.edge_px)
         fill_recovered_markers(view, self._topology, moved, contrasts, places, lost, xy, cov)
         return self._refined_markers(view, estimate, xy, cov, ~lost, places)
 
@@ -222,27 +213,13 @@ class Refiner:
         assert reading is not None
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
-        xy, cov = native.at_full_scale(xy, cov, start_places(places), scale, FULL_SCALE_LIMITS)
+        xy, cov = native.at_full_scale(xy, cov, places, scale, FULL_SCALE_LIMITS)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look)
         blur, noise = scale * estimate.sigma, scale * estimate.noise
         return RefinedMarkers(
             xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)
         )
-
-    def _accepted_markers(
-        self, estimate: Estimate, places: InitialMarkers
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Markers and covariances of an estimate; NaN where not accepted."""
-        measured, spokes = (estimate.measured, estimate.information), self._topology.spokes
-        started = start_places(places)
-        xy, cov = accepted_markers(
-            *measured, estimate.bend_variance, self._topology.edges, spokes, started, self._every_marker
-        )
-        add_dirt_variance(cov, estimate.weight, spokes, places.edge_px)
-        if estimate.convergence_cov_px2 is not None:
-            cov += estimate.convergence_cov_px2
-        return xy, cov
 
 
 def rescaled(estimate: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estimate:

@@ -12,7 +12,8 @@ from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.presets import Schedule
-from extractor.refine.drawn_pattern import Synthesis, draw_pattern
+from extractor.refine.drawn_pattern import LIMITS as DRAWING_LIMITS
+from extractor.refine.drawn_pattern import DrawingLimits
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.measure.marker_scatter import NO_SCATTER
@@ -23,23 +24,20 @@ from extractor.refine.refinement_step import (
     StepLimits,
     StepSolution,
     scatter_of,
-    step_solution,
     with_bending,
     with_pattern_moved,
     with_solution,
 )
 from extractor.refine.solve.convergence import (
-    convergence_covariance,
-    remaining_error,
     remaining_share,
-    typical_deviation,
+    step_remainder,
+    typical_bending,
 )
-from extractor.refine.synthesis.blur_bleed import levels_at_blur
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
+from extractor.refine.synthesis.ink_levels import InkLevels
 
 MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
-READ_SUM = 0  # column of a drawing's sums; above 0 where a gridline is read
 
 
 class SynthesisLimits(NamedTuple):
@@ -50,6 +48,7 @@ class SynthesisLimits(NamedTuple):
         rule: rule of the gridlines' weights.
         step: of the step.
         dot_gain: of the dot gain.
+        drawing: of the drawing.
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
             follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
             0.15 in the second step. Measured: rule "settled appearance".
@@ -61,6 +60,7 @@ class SynthesisLimits(NamedTuple):
     rule: MisfitRule = PIXEL_MISFIT_RULE
     step: StepLimits = STEP_LIMITS
     dot_gain: DotGainLimits = DOT_GAIN_LIMITS
+    drawing: DrawingLimits = DRAWING_LIMITS
     small_change: float = 0.05
     small_bend: float = 2.0
 
@@ -68,28 +68,28 @@ class SynthesisLimits(NamedTuple):
 LIMITS = SynthesisLimits()
 
 
-class SynthesisReading(NamedTuple):
-    """The measurements along the gridlines of a drawing, and the solution.
+class SynthesisStep(NamedTuple):
+    """A step by synthesis.
 
     Attributes:
-        weight: (E,) 0 to 1.
-        variance_ratio: (E,), as ``variance_ratios`` gives it.
+        reading: the gridlines as they were drawn and read.
+        solution: the markers after the step, the fields of ``StepSolution``.
         bend_variance: (E,) px^2.
         dot_gain: px.
-        dot_gain_offset: (E,) px.
         sigma: px, the blur after the step.
-        noise: gray levels, one channel.
-        solution: the markers after the step.
+        levels: the fields of ``InkLevels`` at that blur.
+        is_read: (E,) bool, the gridlines that were read.
+        edge_px: the median length of the gridlines.
     """
 
-    weight: NDArray[np.float64]
-    variance_ratio: NDArray[np.float64]
+    reading: tuple[Any, ...]
+    solution: tuple[Any, ...]
     bend_variance: NDArray[np.float64]
     dot_gain: float
-    dot_gain_offset: NDArray[np.float64]
     sigma: float
-    noise: float
-    solution: StepSolution
+    levels: tuple[NDArray[Any], ...]
+    is_read: NDArray[np.bool_]
+    edge_px: float
 
 
 class SynthesisSolver:
@@ -100,6 +100,7 @@ class SynthesisSolver:
 
     def __init__(self, topology: Topology) -> None:
         self._topology = topology
+        self._no_shift = np.full((len(topology.spokes), 2), np.nan)
         self._kept = threading.local()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -129,15 +130,14 @@ class SynthesisSolver:
             estimate: after the round of profiles.
             schedule: the error that a step may leave for no step to follow.
         """
-        shift = np.full_like(estimate.xy, np.nan)
+        shift = self._no_shift
         for _ in range(LIMITS.max_steps):
             before = self._drawn(estimate)
-            estimate, drawing = self._full_step(view, before)
-            last, shift = shift, estimate.measured - drawing.xy
-            share = remaining_share(drawing.sigma, drawing.edge_px)
-            cov = convergence_covariance(shift, last, drawing.sigma, share)
-            remainder = remaining_error(cov, estimate.information)
-            if remainder < schedule.small_remainder and self._is_settled(before, estimate, drawing):
+            estimate, step = self._full_step(view, before)
+            share = remaining_share(before.sigma, step.edge_px)
+            places = estimate.measured, before.xy, shift
+            shift, cov, remainder = step_remainder(*places, before.sigma, share, estimate.information)
+            if remainder < schedule.small_remainder and self._is_settled(before, estimate, step):
                 break
         return estimate._replace(convergence_cov_px2=cov)
 
@@ -146,46 +146,35 @@ class SynthesisSolver:
         moved = with_pattern_moved(self._topology, estimate)
         return with_bending(self._topology, moved, scatter_of(self._topology, moved))
 
-    def _is_settled(self, before: Estimate, after: Estimate, drawing: Synthesis) -> bool:
+    def _is_settled(self, before: Estimate, after: Estimate, step: SynthesisStep) -> bool:
         """Whether the next drawing would differ from the last one by small moves of the markers only.
 
         Blur or dot gain that has changed, bending that was not drawn, and markers that scatter are drawn otherwise.
         """
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
-        read = drawing.sums[:, READ_SUM] > 0.0
-        if change_px >= LIMITS.small_change * before.sigma or not read.any():
+        if change_px >= LIMITS.small_change * before.sigma:
             return False
         if not before.bend.any():
-            bend_px = np.sqrt(np.mean(after.bend[read] ** 2))
-            if bend_px >= LIMITS.small_bend * typical_deviation(after.information):
+            if typical_bending(after.bend, step.is_read, after.information) >= LIMITS.small_bend:
                 return False
         return scatter_of(self._topology, after) == NO_SCATTER
 
-    def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, Synthesis]:
-        """A step from all measurements."""
-        drawing = draw_pattern(view, self._topology, estimate, self.picture(view.image.shape))
-        return self._update_estimate(estimate, drawing), drawing
-
-    def _update_estimate(self, estimate: Estimate, drawing: Synthesis) -> Estimate:
-        """The estimate after the step by the sums of the drawing."""
-        topology, levels = self._topology, drawing.corrected_levels
-        found = native.update_and_solve(drawing, estimate.pattern_state(), topology, LIMITS)
-        read = SynthesisReading(*(*found[:-1], step_solution(*found[-1])))
-        weights = read.weight, read.variance_ratio, read.dot_gain_offset
-        how = drawing.sides, drawing.added, *weights, drawing.sigma, read.noise
-        reading = GridlineReading(drawing.lines, *how)
-        sigma = read.sigma
-        levels = levels_at_blur(
-            levels, estimate.xy, topology.cells, topology.cell_color, drawing.sigma, sigma
+    def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, SynthesisStep]:
+        """A step from all measurements: the pattern is drawn, compared with the image, and solved for."""
+        picture = self.picture(view.image.shape)
+        step = SynthesisStep(
+            *native.synthesis_step(view, self._topology, picture, estimate, estimate.levels, LIMITS)
         )
-        return with_solution(
+        reading = GridlineReading(*step.reading)
+        after = with_solution(
             estimate,
-            read.solution,
-            bend_variance=read.bend_variance,
-            weight=read.weight,
+            StepSolution(*step.solution),
+            bend_variance=step.bend_variance,
+            weight=reading.weight,
             reading=reading,
-            noise=read.noise,
-            sigma=sigma,
-            levels=levels,
-            dot_gain=read.dot_gain,
+            noise=reading.noise,
+            sigma=step.sigma,
+            levels=InkLevels(*step.levels),
+            dot_gain=step.dot_gain,
         )
+        return after, step

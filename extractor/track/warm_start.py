@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from extractor._native import track as native
 from extractor.image.pyramid import PyramidLevel
-from extractor.numbering.marker_places import InitialMarkers, corner_agreement
+from extractor.numbering.marker_places import InitialMarkers
 from extractor.track.image_check import CONFIRMED, check_cells
 from extractor.track.ink_alignment import align_to_inks
 from extractor.track.warm_tables import WarmTables
@@ -60,19 +60,6 @@ class WarmStart:
     places: InitialMarkers
     cell_levels: NDArray[np.float64]
     by_rim: bool
-
-
-class VerifiedMarkers(NamedTuple):
-    """The corners of proved cells.
-
-    Attributes:
-        xy_px: (M, 2) float64, NaN where no proved cell has a corner.
-        verified_count, cell_count: (M,) int64, number of proved cells and of all cells that meet at each marker.
-    """
-
-    xy_px: NDArray[np.float64]
-    verified_count: NDArray[np.int64]
-    cell_count: NDArray[np.int64]
 
 
 def select_prediction(
@@ -131,11 +118,6 @@ def verify_prediction(
     proved, enough = native.connected_cells(check.verdict, first, known, *cells, LIMITS)
     if not enough:
         return None
-    verified = VerifiedMarkers(*native.verified_markers(aligned.xy_px, proved, tables.corners))
-    agreement = corner_agreement(verified.verified_count, verified.cell_count)
-    places = InitialMarkers(
-        level.to_full_scale(verified.xy_px),
-        aligned.edge_px * level.scale,
-        *agreement,
-    )
+    xy, agreed, is_intact = native.verified_markers(aligned.xy_px, proved, tables.corners)
+    places = InitialMarkers(level.to_full_scale(xy), aligned.edge_px * level.scale, agreed, is_intact)
     return WarmStart(places, np.where(proved[:, None], check.cell_levels, levels_before), by_rim)

@@ -64,8 +64,8 @@ CELLS = (
         "of too many domains only solid domains are kept",
         "accuracy",
         "extractor/cells/seeds.py",
-        "native.find_domains(runs, parent, max_domains, LIMITS)",
-        "native.find_domains(runs, parent, NO_DOMAIN_LIMIT, LIMITS)",
+        "native.find_domains(segmentation.label, max_domains, LIMITS)",
+        "native.find_domains(segmentation.label, NO_DOMAIN_LIMIT, LIMITS)",
     ),
     Rule(
         "larger neighbours",

@@ -61,8 +61,8 @@ REFINEMENT = (
         "a step follows while markers scatter",
         "errors and time",
         "extractor/refine/synthesis_steps.py",
-        "return scatter_of(self._topology, after) == NO_SCATTER",
-        "return True",
+        "or scatter_of(self._topology, after) == NO_SCATTER",
+        "or True",
     ),
     Rule(
         "scatter",

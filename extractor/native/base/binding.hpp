@@ -33,10 +33,10 @@ struct Name {
   std::string text() const { return owner == nullptr ? own : owner->text() + "." + own; }
 };
 
-// The arrays that a call has borrowed from Python; given back when the call ends.
+// What a call has borrowed from Python beside its arguments; given back when the call ends.
 class Borrowed {
  public:
-  Borrowed() { objects_.reserve(64); }
+  Borrowed() = default;
   Borrowed(const Borrowed&) = delete;
   Borrowed& operator=(const Borrowed&) = delete;
   ~Borrowed() {
@@ -53,10 +53,6 @@ class Borrowed {
           (name.text() + " is no array" + (is_written ? " that can be written" : "")).c_str());
     }
     return buffer;
-  }
-  void add_array(nb::handle array) {
-    note_changeable();
-    keep(nb::borrow(array));
   }
   void keep(nb::object object) { objects_.push_back(std::move(object)); }
 
@@ -105,7 +101,7 @@ struct FromPython<View<T, N>> {
 
   static View<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
     if (const NumpyArray* array = fitting_array(object.ptr())) {
-      borrowed.add_array(object);
+      borrowed.note_changeable();
       return strided({reinterpret_cast<T*>(array->data), array->shape, array->strides}, name);
     }
     const Py_buffer& buffer = borrowed.add(object.ptr(), !std::is_const_v<T>, name);
@@ -259,7 +255,11 @@ struct FromPython<std::array<T, N>> {
     if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
     if (PySequence_Check(object.ptr()) == 0 || nb::len(object) != N)
       throw nb::type_error((name.text() + " must have " + std::to_string(N) + " items").c_str());
-    for (std::size_t k = 0; k < N; ++k) values[k] = FromPython<T>::get(nb::object(object[k]), name, borrowed);
+    for (std::size_t k = 0; k < N; ++k) {
+      nb::object item = object[k];
+      values[k] = FromPython<T>::get(item, name, borrowed);
+      borrowed.keep(std::move(item));
+    }
     return values;
   }
 };
@@ -270,8 +270,10 @@ nb::object to_python(Array<T, N>&& array) {
   std::copy(array.shape().begin(), array.shape().end(), shape.begin());
   T* data = array.release();
   if (data == nullptr) data = new T[1];
-  nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
-  return Numpy::get().create(data, N, shape.data(), std::move(owner));
+  PyObject* const owner = PyCapsule_New(data, nullptr, [](PyObject* capsule) {
+    delete[] static_cast<T*>(PyCapsule_GetPointer(capsule, nullptr));
+  });
+  return Numpy::get().create(data, N, shape.data(), nb::steal(owner));
 }
 
 template <class T>

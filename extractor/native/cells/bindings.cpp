@@ -11,8 +11,7 @@
 namespace cmp::cells {
 
 void add_cells(nb::module_ module) {
-  bind<&find_runs>(module, "find_runs", {"label"});
-  bind<&find_domains>(module, "find_domains", {"runs", "parent", "max_domains", "limits"});
+  bind<&find_domains>(module, "find_domains", {"label", "max_domains", "limits"});
   bind<&seed_points>(module, "seed_points", {"runs", "domain", "area"});
   bind<&domain_moments>(module, "domain_moments", {"runs", "domain", "seed_xy"});
   bind<&grow>(module, "grow", {"hsv", "label", "seed_xy", "seed_ink", "limit_px", "limits"});
@@ -24,12 +23,8 @@ void add_cells(nb::module_ module) {
       {"seed_center", "ink", "area_px", "region", "corner_px", "scale", "cluttered", "limits"});
   bind<&equilateral_edge>(module, "equilateral_edge", {"area"});
   bind<&is_intact>(module, "is_intact", {"center", "area", "corner", "limits"});
-  bind<&update_flipped_edges>(module, "update_flipped_edges",
-                              {"points", "ink", "faces", "neighbours", "limits"});
-  bind<&swelling>(module, "swelling", {"points", "ink", "corner", "faces", "limits"});
+  bind<&build_cell_mesh>(module, "build_cell_mesh", {"cells", "limits"});
   bind<&without_swelling>(module, "without_swelling", {"center", "corner", "swelling"});
-  bind<&classify_faces>(module, "classify_faces",
-                        {"points", "ink", "area", "corner", "faces", "neighbours", "limits"});
 }
 
 }  // namespace cmp::cells

@@ -1,8 +1,10 @@
 #include "cells/cell_mesh.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "numeric/delaunay.hpp"
 #include "numeric/median.hpp"
 
 namespace cmp::cells {
@@ -65,8 +67,15 @@ bool has_three_inks(View<const std::uint8_t, 1> ink, Index a, Index b, Index c) 
   return ink[a] != ink[b] && ink[b] != ink[c] && ink[a] != ink[c];
 }
 
-}  // namespace
+// The mesh without its swelling.
+struct ClassifiedFaces {
+  Array<std::int32_t, 2> faces, neighbours;  // (F, 3), as in CellMesh
+  Array<std::int8_t, 1> orientation;         // (F,), as in CellMesh
+};
 
+// Flips edges between cells of one ink where the other diagonal joins two other inks.
+//
+// points (N, 2), ink (N,); faces (F, 3) and neighbours (F, 3) are updated.
 void update_flipped_edges(View<const double, 2> points, View<const std::uint8_t, 1> ink,
                           View<std::int32_t, 2> faces, View<std::int32_t, 2> neighbours,
                           const CellMeshLimits& limits) {
@@ -83,6 +92,9 @@ void update_flipped_edges(View<const double, 2> points, View<const std::uint8_t,
   }
 }
 
+// Corners as red, green, blue; only triangles that are markers or black cells.
+//
+// points (N, 2), ink (N,), area (N,), corner (N, 3, 2) of the cells; faces (F, 3), neighbours (F, 3).
 ClassifiedFaces classify_faces(View<const double, 2> points, View<const std::uint8_t, 1> ink,
                                View<const double, 1> area, View<const double, 3> corner,
                                View<const std::int32_t, 2> faces, View<const std::int32_t, 2> neighbours,
@@ -117,8 +129,13 @@ ClassifiedFaces classify_faces(View<const double, 2> points, View<const std::uin
   return {std::move(ordered), std::move(across), std::move(orientation)};
 }
 
-double swelling(View<const double, 2> points, View<const std::uint8_t, 1> ink, View<const double, 3> corner,
-                View<const std::int32_t, 2> faces, const CellMeshLimits& limits) {
+// Sides of the cells' triangles over those at which neighbours just meet; there a face is as large as the
+// triangles of its cells.
+//
+// points (N, 2), ink (N,), corner (N, 3, 2) of the cells; faces (F, 3).
+double swelling_of(View<const double, 2> points, View<const std::uint8_t, 1> ink,
+                   View<const double, 3> corner, View<const std::int32_t, 2> faces,
+                   const CellMeshLimits& limits) {
   Array<double, 1> ratio({faces.size()});
   Index count = 0;
   for (Index f = 0; f < faces.size(); ++f) {
@@ -132,6 +149,20 @@ double swelling(View<const double, 2> points, View<const std::uint8_t, 1> ink, V
   if (count == 0) return 1.0;
   const double root = std::sqrt(numeric::median_of_many(ratio.slice(0, count)));
   return std::min(std::max(root, 1.0), limits.max_swelling);
+}
+
+}  // namespace
+
+CellMesh build_cell_mesh(const MeshedCells& cells, const CellMeshLimits& limits) {
+  const auto center = cells.center_px;
+  auto [faces, neighbours] = numeric::triangulate(center);
+  update_flipped_edges(center, cells.ink, faces, neighbours, limits);
+  const double swelling = swelling_of(center, cells.ink, cells.corner_px, faces, limits);
+  const Array<double, 3> corner = without_swelling(center, cells.corner_px, swelling);
+  ClassifiedFaces found = classify_faces(center, cells.ink, cells.area_px, corner, faces, neighbours, limits);
+  const std::int64_t count = std::count_if(found.orientation.begin(), found.orientation.end(),
+                                           [](std::int8_t turn) { return turn != 0; });
+  return {std::move(found.faces), std::move(found.neighbours), std::move(found.orientation), swelling, count};
 }
 
 Array<double, 3> without_swelling(View<const double, 2> center, View<const double, 3> corner,

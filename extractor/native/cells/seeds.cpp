@@ -1,5 +1,6 @@
 #include "cells/seeds.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -154,8 +155,15 @@ Array<double, 1> covariance_root(const Domains& domains) {
   return out;
 }
 
-}  // namespace
+// Runs (R, 4) of one ink: y, first x, last x, ink; and (R,) an earlier run of the domain of each run, or
+// itself.
+struct FoundRuns {
+  Array<std::int32_t, 2> runs;
+  Array<std::int32_t, 1> parent;
+};
 
+// The horizontal runs of one ink, connected with the adjacent runs of their ink in the row above
+// (4-neighbours).
 FoundRuns find_runs(View<const std::uint8_t, 2> label) {
   auto found = runs_of_rows(label);
   const auto runs = found.view();
@@ -184,9 +192,12 @@ FoundRuns find_runs(View<const std::uint8_t, 2> label) {
   return {std::move(found), std::move(parents)};
 }
 
-FoundDomains find_domains(View<const std::int32_t, 2> runs, View<const std::int32_t, 1> parent,
-                          Index max_domains, const DomainLimits& limits) {
-  auto all = numbered_domains(runs, parent);
+}  // namespace
+
+FoundDomains find_domains(View<const std::uint8_t, 2> label, Index max_domains, const DomainLimits& limits) {
+  FoundRuns found = find_runs(label);
+  const View<const std::int32_t, 2> runs = found.runs;
+  auto all = numbered_domains(runs, found.parent);
   const Index count = all.area.size();
   Index large = 0;
   for (Index d = 0; d < count; ++d) large += all.area[d] >= limits.min_domain_px;
@@ -199,8 +210,7 @@ FoundDomains find_domains(View<const std::int32_t, 2> runs, View<const std::int3
     all_kept = all_kept && keep[d];
   }
   if (all_kept) {
-    all.runs = Array<std::int32_t, 2>(runs.shape());
-    std::copy_n(runs.flat().begin(), 4 * runs.size(), all.runs.begin());
+    all.runs = std::move(found.runs);
   } else {
     all = selected_domains(runs, all.domain, all.area, keep);
   }
@@ -211,7 +221,12 @@ FoundDomains find_domains(View<const std::int32_t, 2> runs, View<const std::int3
       solid[d] = static_cast<double>(all.area[d]) >= limits.min_solidity * root[d];
     all = selected_domains(all.runs, all.domain, all.area, solid);
   }
-  return {std::move(all.runs), std::move(all.domain), std::move(all.area), is_cluttered};
+  const Index kept = all.area.size();
+  const Index small = std::count_if(all.area.begin(), all.area.end(),
+                                    [&](std::int64_t area) { return area < limits.safe_area_px; });
+  const bool has_large_domains =
+      static_cast<double>(small) < limits.max_small_share * static_cast<double>(kept);
+  return {std::move(all.area), std::move(all.runs), std::move(all.domain), is_cluttered, has_large_domains};
 }
 
 SeedPoints seed_points(View<const std::int32_t, 2> runs, View<const std::int32_t, 1> domain,

@@ -15,32 +15,26 @@ struct DomainLimits {
   std::int64_t min_domain_px;
   std::int64_t min_cluttered_px;
   double min_solidity;
+  std::int64_t safe_area_px;
+  double max_small_share;
 
   template <class F>
   static DomainLimits read(const F& f) {
-    return {f["min_domain_px"], f["min_cluttered_px"], f["min_solidity"]};
+    return {f["min_domain_px"], f["min_cluttered_px"], f["min_solidity"], f["safe_area_px"],
+            f["max_small_share"]};
   }
 };
 
-// Runs (R, 4) of one ink: y, first x, last x, ink; and (R,) an earlier run of the domain of each run, or
-// itself.
-using FoundRuns = std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 1>>;
-// Runs (R, 4), the domain (R,) of each, the areas (D,) of the domains, px^2, and whether there were too many.
-using FoundDomains = std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 1>, Array<std::int64_t, 1>, bool>;
+// area_px (D,), runs (R, 4), domain (R,), cluttered and has_large_domains of Seeds.
+using FoundDomains =
+    std::tuple<Array<std::int64_t, 1>, Array<std::int32_t, 2>, Array<std::int32_t, 1>, bool, bool>;
 // Seeds (D, 2), the domains' centers (D, 2), px, and their inks (D,).
 using SeedPoints = std::tuple<Array<std::int32_t, 2>, Array<double, 2>, Array<std::uint8_t, 1>>;
 
-// The horizontal runs of one ink, connected with the adjacent runs of their ink in the row above
-// (4-neighbours).
+// The domains that are large enough, or, of more than max_domains, those that may be cells.
 //
 // label (H, W), the ink of each pixel or 0.
-FoundRuns find_runs(View<const std::uint8_t, 2> label);
-
-// Selects the domains that are large enough, or, of more than max_domains, those that may be cells.
-//
-// runs (R, 4), parent (R,) as found.
-FoundDomains find_domains(View<const std::int32_t, 2> runs, View<const std::int32_t, 1> parent,
-                          Index max_domains, const DomainLimits& limits);
+FoundDomains find_domains(View<const std::uint8_t, 2> label, Index max_domains, const DomainLimits& limits);
 
 // The seed of each domain, its pixel nearest to its center; runs (R, 4), domain (R,), area (D,).
 SeedPoints seed_points(View<const std::int32_t, 2> runs, View<const std::int32_t, 1> domain,

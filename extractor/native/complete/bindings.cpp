@@ -1,11 +1,9 @@
 // Room "complete" for Python.
 #include "base/binding.hpp"
 
-#include "complete/consistency_filter.hpp"
 #include "complete/image_quality.hpp"
 #include "complete/layer_arcs.hpp"
 #include "complete/repair.hpp"
-#include "complete/uncertain_markers.hpp"
 #include "complete/virtual_markers.hpp"
 
 namespace cmp::complete {
@@ -21,14 +19,11 @@ std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 1>> places_by_layer
 }  // namespace
 
 void add_complete(nb::module_ module) {
-  bind<&update_rejecting_inconsistent>(module, "update_rejecting_inconsistent",
-                                       {"xy", "cov", "evidence", "tables", "size", "limits"});
-  bind<&find_uncertain_markers>(module, "find_uncertain_markers", {"cov", "edge_px", "limits"});
   bind<&places_by_layer>(module, "predict_by_layer", {"xy", "noise_px2", "layers", "limits"});
-  bind<&fill_lost_markers>(module, "fill_lost_markers", {"markers", "tables", "size", "limits"});
-  bind<&locate_on_edges>(module, "locate_on_edges", {"ends", "topology", "points", "limits"});
-  bind<&centers>(module, "centers", {"xy", "corners"});
-  bind<&measure>(module, "measure", {"view", "center", "color", "radius", "limits"});
+  bind<&repair_markers>(module, "repair_markers", {"refined", "places", "tables", "size", "limits"});
+  bind<&locate_on_edges>(module, "locate_on_edges", {"markers", "scatter", "topology", "points", "limits"});
+  bind<&measure_cells>(module, "measure_cells", {"view", "center", "color", "edge_px", "limits"});
+  bind<&measure_numbered>(module, "measure_numbered", {"view", "cells", "xy", "edges", "limits"});
 }
 
 }  // namespace cmp::complete

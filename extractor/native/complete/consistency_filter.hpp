@@ -31,11 +31,6 @@ struct MarkerEvidence {
   View<const double, 1> edge_px;  // (M,) the mean edge at the marker
   View<const bool, 1> agreed;     // (M,) all triangles of the marker, or at least two, were found and agree
   View<const bool, 1> is_intact;  // (M,) all triangles of the marker, and at least two, were found and agree
-
-  template <class F>
-  static MarkerEvidence read(const F& f) {
-    return {f["explained"], f["edge_px"], f["agreed"], f["is_intact"]};
-  }
 };
 
 using ConsistentEdges = std::tuple<Array<double, 1>, bool>;

@@ -49,17 +49,23 @@ std::array<double, 3> lab_of(const Lights& bgr) {
   return {116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])};
 }
 
-// The least CIE76 difference of two inks by their light, and which these are; NaN where unknown.
-std::array<double, 3> least_contrast(const std::array<Lights, COLORS>& median) {
+// The least CIE76 difference of two inks, NaN where unknown, and which these are.
+struct Contrast {
+  double difference = NOT_A_NUMBER;
+  Index one = 0, other = 0;
+};
+
+// The contrast of the inks by their light.
+Contrast least_contrast(const std::array<Lights, COLORS>& median) {
   std::array<std::array<double, 3>, COLORS> lab;
   std::transform(median.begin(), median.end(), lab.begin(), lab_of);
-  std::array<double, 3> out{NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+  Contrast out;
   for (Index a = 0; a < COLORS; ++a) {
     for (Index b = 0; b < a; ++b) {
       const double dl = lab[a][0] - lab[b][0], da = lab[a][1] - lab[b][1], db = lab[a][2] - lab[b][2];
       const double difference = std::sqrt(dl * dl + da * da + db * db);
-      if (difference < out[0] || (std::isnan(out[0]) && !std::isnan(difference)))
-        out = {difference, static_cast<double>(b), static_cast<double>(a)};
+      if (difference < out.difference || (std::isnan(out.difference) && !std::isnan(difference)))
+        out = {difference, b, a};
     }
   }
   return out;
@@ -141,8 +147,7 @@ double evenness(const CellValues& cells, const std::array<Lights, COLORS>& media
   return brightest > 0.0 ? ratio[last] / brightest : NOT_A_NUMBER;
 }
 
-}  // namespace
-
+// (K, 2) the means of the markers (M, 2) at the corners (K, 3).
 Array<double, 2> centers(View<const double, 2> xy, View<const std::int32_t, 2> corners) {
   Array<double, 2> out({corners.size(), 2});
   for (Index i = 0; i < corners.size(); ++i) {
@@ -152,18 +157,27 @@ Array<double, 2> centers(View<const double, 2> xy, View<const std::int32_t, 2> c
   return out;
 }
 
-Array<double, 1> measure(const image::PyramidLevel& view, View<const double, 2> center,
-                         View<const std::uint8_t, 1> color, double radius, const QualityLimits& limits) {
+}  // namespace
+
+CellFigures measure_cells(const image::PyramidLevel& view, View<const double, 2> center,
+                          View<const std::uint8_t, 1> color, double edge_px, const QualityLimits& limits) {
   const auto light = view.response.light;
-  const CellValues cells(view.image, center, color, radius, limits.clipped_value);
-  Array<double, 1> out({5}, NOT_A_NUMBER);
-  if (cells.colored() == 0) return out;
+  const CellValues cells(view.image, center, color, limits.sample_radius * edge_px, limits.clipped_value);
+  if (cells.colored() == 0) return {NOT_A_NUMBER, 0, 0, NOT_A_NUMBER, NOT_A_NUMBER};
   const auto median = cells.median_light(light);
-  const auto contrast = least_contrast(median);
-  std::copy(contrast.begin(), contrast.end(), out.begin());
-  out[3] = static_cast<double>(cells.clipped) / static_cast<double>(cells.colored());
-  out[4] = evenness(cells, median, light, limits.dim_quantile);
-  return out;
+  const auto [contrast, one, other] = least_contrast(median);
+  const double clipping = static_cast<double>(cells.clipped) / static_cast<double>(cells.colored());
+  return {contrast, one, other, clipping, evenness(cells, median, light, limits.dim_quantile)};
+}
+
+std::tuple<CellFigures, double, double> measure_numbered(const image::PyramidLevel& view,
+                                                         const SampledCells& cells, View<const double, 2> xy,
+                                                         View<const std::int32_t, 2> edges,
+                                                         const QualityLimits& limits) {
+  const double edge_px = refine::median_edge(xy, edges, limits.gridlines);
+  const double noise = image::estimate_noise(view.image, xy, cells.corners, limits.noise);
+  const Array<double, 2> center = centers(xy, cells.corners);
+  return {measure_cells(view, center, cells.color, edge_px, limits), noise, edge_px};
 }
 
 }  // namespace cmp::complete

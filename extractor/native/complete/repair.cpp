@@ -64,6 +64,14 @@ double variance_by_layer(Index m, const LayerPrediction& found, double edge_px, 
   return found.variance_px2[m];
 }
 
+// M markers before repair.
+struct UnrepairedMarkers {
+  View<double, 2> xy_px;          // (M, 2) NaN where lost; written
+  View<double, 3> cov_px2;        // (M, 2, 2) NaN where lost; written
+  View<const bool, 1> uncertain;  // (M,)
+  View<const double, 1> edge_px;  // (M,) edge at each marker
+};
+
 // The repair of the lost markers and the fusion of the uncertain ones.
 class Repair {
  public:
@@ -186,9 +194,21 @@ class Repair {
 
 }  // namespace
 
-Array<std::uint8_t, 1> fill_lost_markers(const UnrepairedMarkers& markers, const RingTables& tables,
-                                         const ImageSize& size, const RepairLimits& limits) {
-  return Repair(markers, tables, size, limits).run();
+RepairedMarkers repair_markers(const RefinedMarkers& refined, const refine::StartPlaces& places,
+                               const RingTables& tables, const ImageSize& size, const RepairLimits& limits) {
+  Array<double, 2> xy(refined.xy_px);
+  Array<double, 3> cov(refined.cov_px2);
+  const MarkerEvidence evidence{refined.explained, places.edge_px, places.agreed, places.is_intact};
+  const auto [edge_px, is_complete] =
+      update_rejecting_inconsistent(xy, cov, evidence, tables, size, limits.consistency);
+  const auto [uncertain, is_any] = find_uncertain_markers(cov, edge_px, limits.uncertain);
+  Array<std::uint8_t, 1> status({xy.size()});
+  if (is_complete && !is_any) {
+    for (Index m = 0; m < xy.size(); ++m) status[m] = std::isfinite(xy(m, 0)) ? MEASURED : LOST;
+  } else {
+    status = Repair({xy, cov, uncertain, edge_px}, tables, size, limits).run();
+  }
+  return {std::move(xy), std::move(cov), std::move(status)};
 }
 
 }  // namespace cmp::complete

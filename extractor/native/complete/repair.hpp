@@ -7,8 +7,10 @@
 
 #include "complete/consistency_filter.hpp"
 #include "complete/layer_arcs.hpp"
+#include "complete/uncertain_markers.hpp"
 #include "layout/lattice_tables.hpp"
 #include "layout/neighbour_tables.hpp"
+#include "refine/estimate.hpp"
 
 namespace cmp::complete {
 
@@ -20,6 +22,8 @@ struct RepairLimits {
   double mild_error;
   LayerLimits layers;
   layout::NeighbourMapLimits maps;
+  ConsistencyLimits consistency;
+  UncertainLimits uncertain;
 
   template <class F>
   static RepairLimits read(const F& f) {
@@ -31,26 +35,32 @@ struct RepairLimits {
             f["fitted_model_sigmas"],
             f["mild_error"],
             f["layers"],
-            f["maps"]};
+            f["maps"],
+            f["consistency"],
+            f["uncertain"]};
   }
 };
 
-// M markers before repair.
-struct UnrepairedMarkers {
-  View<double, 2> xy_px;          // (M, 2) NaN where lost; written
-  View<double, 3> cov_px2;        // (M, 2, 2) NaN where lost; written
-  View<const bool, 1> uncertain;  // (M,)
-  View<const double, 1> edge_px;  // (M,) edge at each marker
+// The M markers after refinement.
+struct RefinedMarkers {
+  View<const double, 2> xy_px;    // (M, 2) NaN where not measured
+  View<const double, 3> cov_px2;  // (M, 2, 2) NaN where not measured
+  View<const bool, 1> explained;  // (M,) synthesis explains the image around the marker
 
   template <class F>
-  static UnrepairedMarkers read(const F& f) {
-    return {f["xy_px"], f["cov_px2"], f["uncertain"], f["edge_px"]};
+  static RefinedMarkers read(const F& f) {
+    return {f["xy_px"], f["cov_px2"], f["explained"]};
   }
 };
 
-// Writes places and covariances of the lost markers that are predicted, and fuses the uncertain ones; markers
-// outside the image become NaN. (M,) the status of all markers.
-Array<std::uint8_t, 1> fill_lost_markers(const UnrepairedMarkers& markers, const layout::RingTables& tables,
-                                         const ImageSize& size, const RepairLimits& limits);
+// xy_px, cov_px2 and status of RepairedMarkers.
+using RepairedMarkers = std::tuple<Array<double, 2>, Array<double, 3>, Array<std::uint8_t, 1>>;
+
+// The markers without those that contradict their neighbours, with the lost ones that are predicted, and with
+// the uncertain ones fused with their predictions. No marker lies outside the image if any was lost or
+// uncertain.
+RepairedMarkers repair_markers(const RefinedMarkers& refined, const refine::StartPlaces& places,
+                               const layout::RingTables& tables, const ImageSize& size,
+                               const RepairLimits& limits);
 
 }  // namespace cmp::complete

@@ -17,6 +17,15 @@ struct Vector {
 
 double square(double x) { return x * x; }
 
+// The M markers at the ends of the gridlines.
+struct GridlineEnds {
+  View<const double, 2> xy_px;    // (M, 2)
+  View<const double, 3> cov_px2;  // (M, 2, 2)
+  View<const bool, 1> known;      // (M,)
+  View<const double, 3> maps;     // (M, 2, 5) the local map at each marker
+  refine::MarkerScatter scatter;
+};
+
 // The derivative of the map at marker m along `edge`, a vector of the layout, px per edge; the chord where it
 // is unknown.
 Vector edge_tangent(const GridlineEnds& ends, Index m, Vector edge, Vector chord) {
@@ -174,12 +183,20 @@ class MarkerWeights {
 
 }  // namespace
 
-VirtualMarkers locate_on_edges(const GridlineEnds& ends, const layout::Topology& topology,
-                               View<const double, 3> points, const VirtualLimits& limits) {
+VirtualMarkers locate_on_edges(const LocatedMarkers& markers, const refine::MarkerScatter& scatter,
+                               const layout::Topology& topology, View<const double, 3> points,
+                               const VirtualLimits& limits) {
   const Index count = points.size(0), m = points.size(1);
   Array<double, 3> xy({count, m, 2}, NOT_A_NUMBER);
   Array<double, 4> cov({count, m, 2, 2}, NOT_A_NUMBER);
   Array<std::uint8_t, 2> status({count, m}, LOST);
+  if (m == 0) return {std::move(xy), std::move(cov), std::move(status)};
+  Array<bool, 1> known({markers.status.size()});
+  for (Index k = 0; k < known.size(); ++k) known[k] = markers.status[k] != LOST;
+  const Array<double, 3> maps =
+      refine::local_maps(markers.xy_px, topology.ring_markers, topology.ring_vectors,
+                         topology.derivative_stencil, limits.gridlines);
+  const GridlineEnds ends{markers.xy_px, markers.cov_px2, known, maps, scatter};
   MarkerWeights weights(ends, topology);
   for (Index e = 0; e < count; ++e) {
     const Index a = topology.edges(e, 0), b = topology.edges(e, 1);

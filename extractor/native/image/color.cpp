@@ -128,8 +128,8 @@ Array<double, 1> hue_weights(View<const std::uint8_t, 2> hue, View<const std::ui
   return out;
 }
 
-HueShifts hue_shifts(View<const double, 1> weight, View<const double, 1> nominal_deg,
-                     const HueLimits& limits) {
+FoundHues find_hues(View<const double, 1> weight, View<const double, 1> nominal_deg,
+                    const HueLimits& limits) {
   Array<double, 1> shift({INKS}, 0.0);
   for (std::int64_t round = 0; round < limits.rounds; ++round) {
     std::array<double, INKS> total{}, moment{};
@@ -155,6 +155,10 @@ HueShifts hue_shifts(View<const double, 1> weight, View<const double, 1> nominal
       const double moved = shift[ink] + moment[ink] / total[ink];
       shift[ink] = std::min(std::max(moved, -limits.reach_deg), limits.reach_deg);
     }
+  }
+  for (Index ink = 0; ink < INKS; ++ink) {
+    const double hue_deg = std::fmod(nominal_deg[ink] + shift[ink], 360.0);
+    shift[ink] = hue_deg < 0.0 ? hue_deg + 360.0 : hue_deg;
   }
   return {std::move(shift), true};
 }

@@ -27,7 +27,7 @@ struct HueLimits {
 };
 
 using HueImages = std::tuple<Array<std::uint8_t, 3>, Array<std::uint8_t, 2>, Array<std::uint8_t, 2>>;
-using HueShifts = std::tuple<Array<double, 1>, bool>;
+using FoundHues = std::tuple<Array<double, 1>, bool>;
 
 // HSV (H, W, 3), equal to OpenCV's in every bit; hue (H, W); chroma (H, W), S V / 255, which is max - min of
 // B, G, R.
@@ -41,9 +41,8 @@ Array<double, 1> hue_weights(View<const std::uint8_t, 2> hue, View<const std::ui
 
 // Circular 3-means of a hue histogram (180,), limited to a reach around the nominal hues (3,), degrees.
 //
-// (3,) shifts in degrees, and whether every ink has pixels.
-HueShifts hue_shifts(View<const double, 1> weight, View<const double, 1> nominal_deg,
-                     const HueLimits& limits);
+// (3,) hues in degrees, and whether every ink has pixels.
+FoundHues find_hues(View<const double, 1> weight, View<const double, 1> nominal_deg, const HueLimits& limits);
 
 // (180,): the ink (1, 2, 3) with the nearest of the hues (3,), 0 where all are too far away.
 Array<std::uint8_t, 1> ink_of_hue(View<const double, 1> hues_deg, const HueLimits& limits);

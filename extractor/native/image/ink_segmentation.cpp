@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "image/color.hpp"
-
 namespace cmp::image {
 
 namespace {
@@ -78,8 +76,7 @@ void fill_row_labels(Row hues, Row chromas, View<const std::uint8_t, 2> ranges,
   }
 }
 
-}  // namespace
-
+// Every other pixel of every other row.
 Array<std::uint8_t, 2> subsampled(View<const std::uint8_t, 2> plane) {
   Array<std::uint8_t, 2> out({(plane.size(0) + 1) / 2, (plane.size(1) + 1) / 2});
   for (Index y = 0; y < out.size(0); ++y) {
@@ -91,6 +88,7 @@ Array<std::uint8_t, 2> subsampled(View<const std::uint8_t, 2> plane) {
   return out;
 }
 
+// (3, 2): the first hue of each ink's contiguous range and the number of hues in the range; inks (180,).
 Array<std::uint8_t, 2> hue_ranges(View<const std::uint8_t, 1> inks) {
   Array<std::uint8_t, 2> ranges({INKS, 2}, 0);
   for (Index hue = 0; hue < HUES; ++hue) {
@@ -102,6 +100,9 @@ Array<std::uint8_t, 2> hue_ranges(View<const std::uint8_t, 1> inks) {
   return ranges;
 }
 
+// (3, rows, columns) the largest chroma of each ink in every tile; 0 where it is too small.
+//
+// hue, chroma (H, W); ranges (3, 2) by hue_ranges; tile: side of a tile, px.
 Array<float, 3> tile_max_chroma(View<const std::uint8_t, 2> hue, View<const std::uint8_t, 2> chroma,
                                 View<const std::uint8_t, 2> ranges, Index tile, const LabelLimits& limits) {
   const auto height = hue.size(0), width = hue.size(1);
@@ -125,6 +126,16 @@ Array<float, 3> tile_max_chroma(View<const std::uint8_t, 2> hue, View<const std:
   return level;
 }
 
+// The levels of the inks.
+struct TileThresholds {
+  Array<std::uint8_t, 3> threshold;  // (3, rows, columns) the minimum chroma of an ink's pixels in each tile
+  Array<double, 1> typical;          // (3,) the upper quartile of the ink's levels in all tiles
+};
+
+// The thresholds by the levels (3, rows, columns).
+//
+// A tile's local level is the mean, over the tile and its neighbours, of the largest level around each of
+// these.
 TileThresholds tile_thresholds(View<const float, 3> level, const LabelLimits& limits) {
   const auto rows = level.size(1), columns = level.size(2);
   Array<std::uint8_t, 3> threshold({INKS, rows, columns});
@@ -158,21 +169,48 @@ TileThresholds tile_thresholds(View<const float, 3> level, const LabelLimits& li
   return {std::move(threshold), std::move(typical)};
 }
 
+// (H, W): each pixel's ink where its chroma exceeds the tile's threshold (3, rows, columns), inside the
+// target area.
 Array<std::uint8_t, 2> label_pixels(View<const std::uint8_t, 2> hue, View<const std::uint8_t, 2> chroma,
-                                    View<const std::uint8_t, 2> ranges, const LabelTiles& tiles) {
+                                    View<const std::uint8_t, 2> ranges, View<const std::uint8_t, 3> threshold,
+                                    Index tile, const Target& target) {
   const auto height = chroma.size(0), width = chroma.size(1);
   Array<std::uint8_t, 2> label({height, width});
   Array<std::uint8_t, 2> limit({INKS + 1, width}, 0);
   for (Index y = 0; y < height; ++y) {
-    if (y % tiles.target_tile_px == 0)
-      fill_upsampled_row(tiles.target[y / tiles.target_tile_px], tiles.target_tile_px, limit[INKS]);
-    if (y % tiles.tile_px == 0) {
-      for (Index ink = 0; ink < INKS; ++ink)
-        fill_upsampled_row(tiles.threshold[ink][y / tiles.tile_px], tiles.tile_px, limit[ink]);
+    if (y % target.tile_px == 0)
+      fill_upsampled_row(target.mask[y / target.tile_px], target.tile_px, limit[INKS]);
+    if (y % tile == 0) {
+      for (Index ink = 0; ink < INKS; ++ink) fill_upsampled_row(threshold[ink][y / tile], tile, limit[ink]);
     }
     fill_row_labels(hue[y], chroma[y], ranges, limit, label[y]);
   }
   return label;
+}
+
+}  // namespace
+
+SegmentedImage segment(View<const std::uint8_t, 2> hue, View<const std::uint8_t, 2> chroma,
+                       const Target& target, View<const double, 1> nominal_deg, const LabelLimits& limits) {
+  const Index height = chroma.size(0), width = chroma.size(1);
+  const Index across = std::min(height, width) / limits.tiles_across / target.tile_px * target.tile_px;
+  const Index tile = std::max(limits.tile_px, across);
+  const bool is_large = height * width > limits.survey_pixels;
+  Array<std::uint8_t, 2> some_hues, some_chroma;
+  if (is_large) {
+    some_hues = subsampled(hue);
+    some_chroma = subsampled(chroma);
+  }
+  const View<const std::uint8_t, 2> survey_hue = is_large ? some_hues.view() : hue;
+  const View<const std::uint8_t, 2> survey_chroma = is_large ? some_chroma.view() : chroma;
+  auto [hues_deg, found] =
+      find_hues(hue_weights(survey_hue, survey_chroma, limits.hues), nominal_deg, limits.hues);
+  if (!found) return {};
+  const Array<std::uint8_t, 2> ranges = hue_ranges(ink_of_hue(hues_deg, limits.hues));
+  TileThresholds levels = tile_thresholds(
+      tile_max_chroma(survey_hue, survey_chroma, ranges, is_large ? tile / 2 : tile, limits), limits);
+  return {true, label_pixels(hue, chroma, ranges, levels.threshold, tile, target), std::move(hues_deg),
+          std::move(levels.typical)};
 }
 
 }  // namespace cmp::image

@@ -1,8 +1,6 @@
 // Room "localmap" for Python.
 #include "base/binding.hpp"
 
-#include "localmap/affine_maps.hpp"
-#include "localmap/cell_prediction.hpp"
 #include "localmap/neighbour_prediction.hpp"
 #include "localmap/regularised_maps.hpp"
 
@@ -23,9 +21,6 @@ predict(View<const double, 2> xy_px, View<const double, 1> noise_px2, View<const
 }  // namespace
 
 void add_localmap(nb::module_ module) {
-  bind<&completed_linear_maps>(module, "completed_linear_maps",
-                               {"center_px", "corner_px", "cell", "mirrored", "layout", "limits"});
-  bind<&lattice_bases>(module, "lattice_bases", {"center", "axial", "limits"});
   bind<&predict>(module, "predict_markers", {"xy_px", "noise_px2", "wanted", "marker_mm", "table", "limits"});
   bind<&fill_quadratic_derivatives>(module, "fill_quadratic_derivatives",
                                     {"xy", "markers", "ring_markers", "ring_vectors", "out", "limits"});

@@ -37,11 +37,6 @@ struct KnownCells {
   View<const double, 3> basis;        // (K, 2, 2) px per axial step
   View<const double, 1> radius_px;    // (K,) over which the cell's color is sampled
   View<const double, 1> level;        // (K,) the sum of its channels, NaN outside the image
-
-  template <class F>
-  static KnownCells read(const F& f) {
-    return {f["cells"], f["basis"], f["radius_px"], f["level"]};
-  }
 };
 
 // P predicted down-cells.

@@ -20,13 +20,11 @@ void add_numbering(nb::module_ module) {
       {"center", "faces", "neighbours", "orientation", "component", "front", "reach", "limits"});
   bind<&count_meshed_cells>(module, "count_meshed_cells", {"faces", "orientation", "count"});
   bind<&align>(module, "align", {"axial", "layout_axial", "cell_lookup", "limits"});
-  bind<&measure_inks>(module, "measure_inks", {"image", "center", "area", "ink", "known", "limits"});
-  bind<&search_white_cell>(module, "search_white_cell",
-                           {"image", "center", "axial", "known", "inks", "layout", "limits"});
+  bind<&search_white_cell>(module, "search_white_cell", {"image", "cells", "axial", "layout", "limits"});
   bind<&predicted_corners>(module, "predicted_corners",
                            {"center_px", "cell", "layout", "mirrored", "limits"});
-  bind<&cell_corners>(module, "cell_corners", {"cells", "vectors_mm", "corner_ids", "limits"});
-  bind<&average_corners>(module, "average_corners", {"corners", "count", "limits"});
+  bind<&merge_corners>(module, "merge_corners",
+                       {"cells", "numbers", "layout", "corner_ids", "markers", "limits"});
 }
 
 }  // namespace cmp::numbering

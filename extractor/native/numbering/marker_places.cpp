@@ -15,6 +15,23 @@ constexpr double FITTED_WEIGHT = 1.0;
 
 using Triangle = std::array<PlanePoint, 3>;
 
+// The N cells of the image with their local maps.
+struct MappedCells {
+  View<const double, 2> center_px;   // (N, 2)
+  View<const double, 3> corner_px;   // (N, 3, 2) of the triangles, clockwise
+  View<const double, 3> slope;       // (N, 2, 2) px per mm, NaN where unknown
+  View<const std::int32_t, 1> cell;  // (N,) the layout's cell, or -1
+  bool mirrored;                     // the pattern is seen from its back
+};
+
+// The corners of the C numbered cells with a local map, by the layout's corners 0, 1, 2.
+struct CellCorners {
+  Array<std::int32_t, 2> ids;  // (C, 3) marker ids
+  Array<double, 3> corner_px;  // (C, 3, 2) of the cell's triangle where that is fitted, else predicted
+  Array<double, 1> edge_px;    // (C,) the mean predicted edge
+  Array<bool, 1> is_fitted;    // (C,) the triangle agrees with the prediction
+};
+
 PlanePoint point_of(View<const double, 2> xy, Index m) { return {xy(m, 0), xy(m, 1)}; }
 
 Triangle triangle_of(View<const double, 3> corner_px, Index n) {
@@ -97,7 +114,7 @@ Array<std::int64_t, 1> count_agreeing(const CellCorners& corners, View<const dou
   const double agreed2 = limits.max_agreed_spread * limits.max_agreed_spread;
   Array<std::int64_t, 1> agreeing({xy.size()}, 0);
   const auto agreed = agreeing.view();
-  const auto ids = corners.ids;
+  const auto ids = corners.ids.view();
   for (Index n = 0; n < corners.ids.size(); ++n) {
     if (!corners.is_fitted[n]) continue;
     const Triangle corner = triangle_of(corners.corner_px, n);
@@ -112,10 +129,11 @@ Array<std::int64_t, 1> count_agreeing(const CellCorners& corners, View<const dou
   return agreeing;
 }
 
-}  // namespace
-
-CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> vectors_mm,
-                              View<const std::int32_t, 2> corner_ids, const CornerLimits& limits) {
+// The corners of the cells with a slope.
+//
+// vectors_mm (U, 3, 2) from the layout's centers to the corners; corner_ids (U, 3), their markers.
+CellCorners cell_corners(const MappedCells& cells, View<const double, 3> vectors_mm,
+                         View<const std::int32_t, 2> corner_ids, const CornerLimits& limits) {
   Array<Index, 1> here({cells.slope.size()});
   Index count = 0;
   for (Index i = 0; i < cells.slope.size(); ++i)
@@ -145,11 +163,20 @@ CellCornerArrays cell_corners(const MappedCells& cells, View<const double, 3> ve
   return {std::move(ids), std::move(corner_px), std::move(edge), std::move(fitted)};
 }
 
-MergedCornerArrays average_corners(const CellCorners& corners, Index count, const CornerLimits& limits) {
-  const auto sums = corner_sums(corners, count, limits.predicted_weight);
-  Array<double, 2> xy({count, 2}, NOWHERE);
-  Array<double, 1> edge({count}, NOWHERE);
-  for (Index m = 0; m < count; ++m) {
+}  // namespace
+
+InitialMarkers merge_corners(const TriangularCells& cells, const CellNumbers& numbers,
+                             const layout::LayoutCells& layout, View<const std::int32_t, 2> corner_ids,
+                             Index markers, const CornerLimits& limits) {
+  const Array<double, 3> slope = localmap::completed_linear_maps(
+      cells.center_px, cells.corner_px, numbers.cell, numbers.mirrored, layout, limits.maps);
+  const CellCorners corners =
+      cell_corners({cells.center_px, cells.corner_px, slope, numbers.cell, numbers.mirrored},
+                   layout.corner_vectors_mm, corner_ids, limits);
+  const auto sums = corner_sums(corners, markers, limits.predicted_weight);
+  Array<double, 2> xy({markers, 2}, NOWHERE);
+  Array<double, 1> edge({markers}, NOWHERE);
+  for (Index m = 0; m < markers; ++m) {
     const double weight = sums(m, WEIGHT);
     if (weight > 0.0) {
       xy(m, 0) = sums(m, X) / weight;
@@ -157,8 +184,17 @@ MergedCornerArrays average_corners(const CellCorners& corners, Index count, cons
       edge[m] = sums(m, EDGE) / weight;
     }
   }
-  auto agreeing = count_agreeing(corners, xy, limits);
-  return {std::move(xy), std::move(edge), std::move(agreeing)};
+  const Array<std::int64_t, 1> agreeing = count_agreeing(corners, xy, limits);
+  Array<std::int64_t, 1> meeting({markers}, 0);
+  for (Index u = 0; u < corner_ids.size(); ++u)
+    for (const std::int32_t m : corner_ids[u]) ++meeting[m];
+  Array<bool, 1> agreed({markers}), is_intact({markers});
+  for (Index m = 0; m < markers; ++m) {
+    const CornerAgreement agreement(agreeing[m], meeting[m]);
+    agreed[m] = agreement.agreed;
+    is_intact[m] = agreement.is_intact;
+  }
+  return {std::move(xy), std::move(edge), std::move(agreed), std::move(is_intact)};
 }
 
 }  // namespace cmp::numbering

@@ -102,7 +102,8 @@ VerifiedPlaces verify_placements(const Scene& scene, View<const std::int64_t, 1>
 }
 
 WhiteCandidates no_candidates() {
-  return {-1,
+  return {0,
+          -1,
           Array<std::int32_t, 2>({0, 0}),
           Array<std::int64_t, 1>({0}),
           Array<std::int64_t, 1>({0}),
@@ -112,10 +113,17 @@ WhiteCandidates no_candidates() {
 
 }  // namespace
 
-WhiteCandidates search_white_cell(View<const std::uint8_t, 3> image, View<const double, 2> center,
-                                  View<const std::int32_t, 2> axial, const localmap::KnownCells& known,
-                                  const InkColors& inks, const WhiteCellLayout& layout,
+WhiteCandidates search_white_cell(View<const std::uint8_t, 3> image, const SearchedCells& cells,
+                                  View<const std::int32_t, 2> axial, const WhiteCellLayout& layout,
                                   const WhiteSearchLimits& limits) {
+  const auto center = cells.center_px;
+  const auto [index, basis] = localmap::lattice_bases(center, axial, limits.prediction);
+  // more cells than the layout has do not fit anywhere
+  const Index more = index.size() - layout.center_mm.size();
+  const double most = limits.prediction.max_outside_share * static_cast<double>(index.size());
+  if (index.size() == 0 || static_cast<double>(more) > most) return no_candidates();
+  const MeasuredInks inks = measure_inks(image, center, cells.area_px, cells.ink, index, limits.whiteness);
+  const localmap::KnownCells known{index, basis, inks.radius_px, inks.level};
   auto grid = localmap::build_axial_grid(axial, known.cells, known.level);
   Array<double, 1> black;
   for (Index ring = 0; ring < localmap::RINGS; ++ring) {
@@ -136,7 +144,8 @@ WhiteCandidates search_white_cell(View<const std::uint8_t, 3> image, View<const 
     auto found = verify_placements({image, center, axial}, known.cells, candidates, layout, inks.colors,
                                    black, limits);
     if (found.is_any_fit())
-      return {ring,
+      return {index.size(),
+              ring,
               std::move(found.cell),
               std::move(found.inside),
               std::move(found.missing),

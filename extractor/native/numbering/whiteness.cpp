@@ -41,9 +41,9 @@ Shade fill_patch_color(View<const double, 1> patches, Index n, double level, Vie
 
 }  // namespace
 
-std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 2>, Array<double, 1>> measure_inks(
-    View<const std::uint8_t, 3> image, View<const double, 2> center, View<const double, 1> area,
-    View<const std::uint8_t, 1> ink, View<const std::int64_t, 1> known, const WhitenessLimits& limits) {
+MeasuredInks measure_inks(View<const std::uint8_t, 3> image, View<const double, 2> center,
+                          View<const double, 1> area, View<const std::uint8_t, 1> ink,
+                          View<const std::int64_t, 1> known, const WhitenessLimits& limits) {
   const Index count = known.size();
   Array<double, 1> radius({count}), level({count}, std::numeric_limits<double>::quiet_NaN());
   Array<double, 3> samples({INKS, CHANNELS, count});

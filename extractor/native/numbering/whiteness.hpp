@@ -22,11 +22,14 @@ struct InkColors {
   View<const double, 2>
       colors;  // (4, 3) median BGR of red, green and blue in rows 1 to 3; 0 for an absent ink
   View<const double, 1> strongest;  // (3,) the maximum of each channel
+};
 
-  template <class F>
-  static InkColors read(const F& f) {
-    return {f["colors"], f["strongest"]};
-  }
+// The same with memory of its own, and the K cells that were measured.
+struct MeasuredInks {
+  Array<double, 1> radius_px;  // (K,) over which the cell's color is sampled
+  Array<double, 1> level;      // (K,) the sum of its channels, NaN outside the image
+  Array<double, 2> colors;     // (4, 3) as in InkColors
+  Array<double, 1> strongest;  // (3,) as in InkColors
 };
 
 // The colors of P predicted places.
@@ -36,13 +39,13 @@ struct PlaceColors {
   Array<double, 2> color;       // (P, 3) BGR, 0 outside the image
 };
 
-// The radii and levels (K,) of known cells, and the colors (4, 3) and strongest channels (3,) of the inks.
+// The levels of known cells, and the colors of the inks.
 //
 // image (H, W, 3) BGR without gaps; center (N, 2) px; area (N,) px^2; ink (N,) of the cells of the image;
 // known (K,), the cells that are measured.
-std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 2>, Array<double, 1>> measure_inks(
-    View<const std::uint8_t, 3> image, View<const double, 2> center, View<const double, 1> area,
-    View<const std::uint8_t, 1> ink, View<const std::int64_t, 1> known, const WhitenessLimits& limits);
+MeasuredInks measure_inks(View<const std::uint8_t, 3> image, View<const double, 2> center,
+                          View<const double, 1> area, View<const std::uint8_t, 1> ink,
+                          View<const std::int64_t, 1> known, const WhitenessLimits& limits);
 
 // The colors of predicted places.
 //

@@ -1,5 +1,6 @@
 #include "refine/acceptance.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -23,6 +24,38 @@ void update_to_unknown(View<double, 2> xy, View<double, 3> cov, Index m) {
 void add_variance(View<double, 3> cov, Index m, double variance) {
   cov(m, 0, 0) += variance;
   cov(m, 1, 1) += variance;
+}
+
+// Adds the variance by dirt to the covariances (M, 2, 2) px^2: dirt on some gridlines moves the others, too.
+//
+// weight (E,) 0 to 1, of the gridlines, 0 where nothing was measured; spokes (M, 6); edge (M,) px, the length
+// of the edges at each marker.
+void add_dirt_variance(View<double, 3> cov, View<const double, 1> weight, View<const std::int32_t, 2> spokes,
+                       View<const double, 1> edge, const HiddenMarkerLimits& limits) {
+  for (Index m = 0; m < cov.size(); ++m) {
+    double missing = 0.0;
+    Index count = 0;
+    for (Index k = 0; k < spokes.size(1); ++k) {
+      const std::int32_t e = spokes(m, k);
+      if (e >= 0 && weight[e] > 0.0) {
+        missing += 1.0 - weight[e];
+        ++count;
+      }
+    }
+    const auto divisor = static_cast<double>(std::max<Index>(count, 1));
+    add_variance(cov, m, squared(limits.dirt_deviation * edge[m] * missing / divisor));
+  }
+}
+
+// Markers (M, 2) px far from their start become NaN, as the drawing does not explain the image.
+void update_unexplained_markers(View<double, 2> xy, View<double, 3> cov, const StartPlaces& places,
+                                double dot_gain, const HiddenMarkerLimits& limits) {
+  for (Index m = 0; m < xy.size(); ++m) {
+    const double dx = xy(m, 0) - places.xy_px(m, 0), dy = xy(m, 1) - places.xy_px(m, 1);
+    const double limit =
+        limits.max_shift_unexplained * places.edge_px[m] + limits.dot_gain_factor * std::abs(dot_gain);
+    if (std::sqrt(dx * dx + dy * dy) > limit) update_to_unknown(xy, cov, m);
+  }
 }
 
 }  // namespace
@@ -51,35 +84,23 @@ AcceptedMarkers accepted_markers(View<const double, 2> measured, const Informati
   return {std::move(out), std::move(out_cov)};
 }
 
-void add_dirt_variance(View<double, 3> cov, View<const double, 1> weight, View<const std::int32_t, 2> spokes,
-                       View<const double, 1> edge, const HiddenMarkerLimits& limits) {
-  for (Index m = 0; m < cov.size(); ++m) {
-    double missing = 0.0;
-    Index count = 0;
-    for (Index k = 0; k < spokes.size(1); ++k) {
-      const std::int32_t e = spokes(m, k);
-      if (e >= 0 && weight[e] > 0.0) {
-        missing += 1.0 - weight[e];
-        ++count;
-      }
-    }
-    const auto divisor = static_cast<double>(std::max<Index>(count, 1));
-    add_variance(cov, m, squared(limits.dirt_deviation * edge[m] * missing / divisor));
-  }
-}
-
-Array<bool, 1> update_unaccepted_markers(View<double, 2> xy, View<double, 3> cov,
-                                         View<const double, 2> reliable, View<const double, 2> start,
-                                         View<const double, 1> edge, bool unexplained, double dot_gain,
-                                         const HiddenMarkerLimits& limits) {
-  Array<bool, 1> out({xy.size()});
-  for (Index m = 0; m < xy.size(); ++m) {
-    const double dx = xy(m, 0) - start(m, 0), dy = xy(m, 1) - start(m, 1);
-    const double limit = limits.max_shift_unexplained * edge[m] + limits.dot_gain_factor * std::abs(dot_gain);
-    if (unexplained && std::sqrt(dx * dx + dy * dy) > limit) update_to_unknown(xy, cov, m);
-    out[m] = (std::isnan(xy(m, 0)) || std::isnan(reliable(m, 0))) && std::isfinite(start(m, 0));
-  }
-  return out;
+FinalMarkers accept_markers(const SolvedMarkers& solved, const StartPlaces& places,
+                            const layout::Topology& topology, const FinalLimits& limits) {
+  const Array<bool, 1> every({solved.measured.size()}, true);
+  auto [xy, cov] = accepted_markers(solved.measured, solved.information, solved.bend_variance, topology.edges,
+                                    topology.spokes, places, every, limits.acceptance);
+  add_dirt_variance(cov, solved.weight, topology.spokes, places.edge_px, limits.hidden);
+  const auto remaining = solved.convergence_cov_px2.flat();
+  const auto variances = cov.flat();
+  for (Index k = 0; k < variances.size(); ++k) variances[k] += remaining[k];
+  if (solved.noise > limits.unexplained_noise_ratio * solved.pixel_noise)
+    update_unexplained_markers(xy, cov, places, solved.dot_gain, limits.hidden);
+  Array<bool, 1> unaccepted({xy.size()});
+  for (Index m = 0; m < xy.size(); ++m)
+    unaccepted[m] =
+        (std::isnan(xy(m, 0)) || std::isnan(solved.reliable(m, 0))) && std::isfinite(places.xy_px(m, 0));
+  const bool all_accepted = std::find(unaccepted.begin(), unaccepted.end(), true) == unaccepted.end();
+  return {std::move(xy), std::move(cov), std::move(unaccepted), all_accepted};
 }
 
 Array<bool, 1> update_lost_markers(View<double, 2> xy, View<double, 3> cov, View<const bool, 1> unaccepted,

@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "base/array.hpp"
+#include "layout/topology.hpp"
 #include "refine/estimate.hpp"
 #include "refine/solve/fisher_information.hpp"
 
@@ -36,6 +37,42 @@ struct HiddenMarkerLimits {
   }
 };
 
+// Limits of both; explained in extractor/refine/acceptance.py.
+struct FinalLimits {
+  double unexplained_noise_ratio;
+  AcceptanceLimits acceptance;
+  HiddenMarkerLimits hidden;
+
+  template <class F>
+  static FinalLimits read(const F& f) {
+    return {f["unexplained_noise_ratio"], f["acceptance"], f["hidden"]};
+  }
+};
+
+// The markers as the last step left them.
+struct SolvedMarkers {
+  View<const double, 2> measured, reliable;  // (M, 2) px; reliable: NaN where the image shows a marker little
+  Information information;
+  View<const double, 1> bend_variance;        // (E,) px^2
+  View<const double, 1> weight;               // (E,) 0 to 1, of the gridlines, 0 where nothing was measured
+  double noise, pixel_noise;                  // gray levels, one channel
+  double dot_gain;                            // px
+  View<const double, 3> convergence_cov_px2;  // (M, 2, 2) of the error that the last step left
+
+  template <class F>
+  static SolvedMarkers read(const F& f) {
+    return {f["measured"], f["reliable"],    f["information"], f["bend_variance"],      f["weight"],
+            f["noise"],    f["pixel_noise"], f["dot_gain"],    f["convergence_cov_px2"]};
+  }
+};
+
+// xy_px, cov_px2, unaccepted and all_accepted of FinalMarkers.
+using FinalMarkers = std::tuple<Array<double, 2>, Array<double, 3>, Array<bool, 1>, bool>;
+
+// Tests all markers. Where the drawing explains nothing well, markers far from their start are not accepted.
+FinalMarkers accept_markers(const SolvedMarkers& solved, const StartPlaces& places,
+                            const layout::Topology& topology, const FinalLimits& limits);
+
 // Markers (M, 2) px and covariances (M, 2, 2) px^2, NaN where not accepted.
 using AcceptedMarkers = std::tuple<Array<double, 2>, Array<double, 3>>;
 
@@ -47,23 +84,6 @@ AcceptedMarkers accepted_markers(View<const double, 2> measured, const Informati
                                  View<const double, 1> bend_variance, View<const std::int32_t, 2> edges,
                                  View<const std::int32_t, 2> spokes, const StartPlaces& places,
                                  View<const bool, 1> selected, const AcceptanceLimits& limits);
-
-// Adds the variance by dirt to the covariances (M, 2, 2) px^2: dirt on some gridlines moves the others, too.
-//
-// weight (E,) 0 to 1, of the gridlines, 0 where nothing was measured; spokes (M, 6); edge (M,) px, the length
-// of the edges at each marker.
-void add_dirt_variance(View<double, 3> cov, View<const double, 1> weight, View<const std::int32_t, 2> spokes,
-                       View<const double, 1> edge, const HiddenMarkerLimits& limits);
-
-// (M,), the markers with a start that are not accepted or not reliable.
-//
-// xy (M, 2) px and cov (M, 2, 2) px^2, NaN where not accepted; where all is unexplained (the drawing does not
-// explain the image), markers far from their start become NaN; reliable (M, 2) px, NaN where the image shows
-// a marker little; start (M, 2) px and edge (M,) px, as in StartPlaces; dot_gain px.
-Array<bool, 1> update_unaccepted_markers(View<double, 2> xy, View<double, 3> cov,
-                                         View<const double, 2> reliable, View<const double, 2> start,
-                                         View<const double, 1> edge, bool unexplained, double dot_gain,
-                                         const HiddenMarkerLimits& limits);
 
 // (M,), the lost markers: with a start, and not accepted.
 //

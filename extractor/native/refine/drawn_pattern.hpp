@@ -17,23 +17,9 @@
 
 namespace cmp::refine {
 
-// The pattern as it is drawn, as far as a step needs it.
-struct Synthesis {
-  View<const double, 2> lines;      // (E, 8) the gridlines
-  View<const double, 2> bend;       // (E, 2) px, their bending
-  View<const double, 2> contrasts;  // (E, 3), as value_contrasts gives them
-  View<const double, 2> sums;       // (E, 24), as accumulate_residual_sums gives them
-  double sigma;                     // the blur, px
-
-  template <class F>
-  static Synthesis read(const F& f) {
-    return {f["lines"], f["bend"], f["contrasts"], f["sums"], f["sigma"]};
-  }
-};
-
 // Limits of the drawing; explained in extractor/refine/drawn_pattern.py.
 struct DrawingLimits {
-  double blur_step;
+  double margin_sigma, margin_px, blur_step;
   GridlineLimits gridlines;
   InkLevelLimits levels;
   BleedLimits bleed;
@@ -42,12 +28,15 @@ struct DrawingLimits {
 
   template <class F>
   static DrawingLimits read(const F& f) {
-    return {f["blur_step"], f["gridlines"], f["levels"], f["bleed"], f["rows"], f["weights"]};
+    return {f["margin_sigma"], f["margin_px"], f["blur_step"], f["gridlines"],
+            f["levels"],       f["bleed"],     f["rows"],      f["weights"]};
   }
 };
 
-// lines, sides, contrasts, added, sums, corrected_levels and edge_px of Synthesis; the levels as the fields
-// of InkLevels.
+// The gridlines (E, 8); the light on both sides (E, 6), as GridlineSides gives it; contrasts (E, 3), as
+// value_contrasts gives them; the light to add on both sides (E, 6); the sums along the gridlines (E, 24), as
+// accumulate_residual_sums gives them; the levels, corrected by the residual in the middles of the cells; and
+// the median length of the gridlines, px.
 using DrawnPattern = std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 2>, Array<double, 2>,
                                 Array<double, 2>, LevelArrays, double>;
 

@@ -9,16 +9,9 @@
 namespace cmp::refine {
 
 void add_markers(nb::module_ module) {
-  bind<&suspect_markers<double>>(module, "suspect_markers", {"profile_weight", "weight", "spokes", "limits"});
   bind<&correct_outliers>(module, "correct_outliers",
-                          {"topology", "markers", "places", "suspect", "scale", "limits"});
-  bind<&accepted_markers>(
-      module, "accepted_markers",
-      {"measured", "information", "bend_variance", "edges", "spokes", "places", "selected", "limits"});
-  bind<&add_dirt_variance>(module, "add_dirt_variance", {"cov", "weight", "spokes", "edge", "limits"});
-  bind<&update_unaccepted_markers>(
-      module, "update_unaccepted_markers",
-      {"xy", "cov", "reliable", "start", "edge", "unexplained", "dot_gain", "limits"});
+                          {"topology", "markers", "places", "profile_weight", "scale", "limits"});
+  bind<&accept_markers>(module, "accept_markers", {"solved", "places", "topology", "limits"});
   bind<&update_lost_markers>(module, "update_lost_markers",
                              {"xy", "cov", "unaccepted", "predicted", "start", "edge", "limits"});
   bind<&fill_recovered_markers>(module, "fill_recovered_markers",

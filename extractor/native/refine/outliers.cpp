@@ -209,8 +209,11 @@ Array<bool, 1> outlier_markers(View<const double, 2> xy, View<const double, 3> m
 }  // namespace
 
 CorrectedOutliers correct_outliers(const Topology& topology, const MeasuredMarkers& markers,
-                                   const StartPlaces& places, View<const bool, 1> suspect, double scale,
-                                   const OutlierLimits& limits) {
+                                   const StartPlaces& places, View<const double, 1> profile_weight,
+                                   double scale, const OutlierLimits& limits) {
+  const Array<bool, 1> suspect =
+      suspect_markers<double>(profile_weight, markers.weight, topology.spokes, limits);
+  if (!any(suspect)) return {};
   const Index count = suspect.size();
   Array<double, 2> known(markers.reliable), measured(markers.measured), reliable(markers.reliable);
   Array<double, 2> start(places.xy_px);

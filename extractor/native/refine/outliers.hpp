@@ -42,14 +42,16 @@ struct MeasuredMarkers {
   View<const double, 2> measured, reliable;  // (M, 2) as in Estimate
   View<const bool, 1> hidden;                // (M,)
   View<const double, 3> maps;                // (M, 2, 5) as local_maps gives them
+  View<const double, 1> weight;              // (E,) of the gridlines in the step
 
   template <class F>
   static MeasuredMarkers read(const F& f) {
-    return {f["measured"], f["reliable"], f["hidden"], f["maps"]};
+    return {f["measured"], f["reliable"], f["hidden"], f["maps"], f["weight"]};
   }
 };
 
-// found; measured and reliable (M, 2); xy_px (M, 2), agreed (M,) and is_intact (M,) of the places.
+// found; measured and reliable (M, 2); xy_px (M, 2), agreed (M,) and is_intact (M,) of the places. The arrays
+// are empty if nothing was found.
 using CorrectedOutliers =
     std::tuple<bool, Array<double, 2>, Array<double, 2>, Array<double, 2>, Array<bool, 1>, Array<bool, 1>>;
 
@@ -76,9 +78,9 @@ Array<bool, 1> suspect_markers(View<const double, 1> profile_weight, View<const 
 
 // Puts the outliers where their neighbours predict them.
 //
-// The markers are px of the image reduced by scale, the places of the full image; suspect is (M,).
+// The markers are px of the image reduced by scale, the places of the full image; profile_weight is (E,).
 CorrectedOutliers correct_outliers(const layout::Topology& topology, const MeasuredMarkers& markers,
-                                   const StartPlaces& places, View<const bool, 1> suspect, double scale,
-                                   const OutlierLimits& limits);
+                                   const StartPlaces& places, View<const double, 1> profile_weight,
+                                   double scale, const OutlierLimits& limits);
 
 }  // namespace cmp::refine

@@ -4,14 +4,18 @@
 
 namespace cmp::refine {
 
-SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& state,
-                                  const layout::Topology& topology, const SynthesisLimits& limits) {
-  const auto lines = drawing.lines, contrasts = drawing.contrasts;
+SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topology& topology,
+                             View<float, 3> picture, const PatternState& state, const InkLevels& levels,
+                             const SynthesisLimits& limits) {
+  const double sigma = state.sigma, margin = limits.drawing.margin_sigma * sigma + limits.drawing.margin_px;
+  const Array<std::int64_t, 1> box = pattern_box(state.xy, margin, view.image.size(1), view.image.size(0));
+  auto [lines, sides, contrasts, added, sums, corrected, edge_px] =
+      draw_pattern(view, topology, picture, state, levels, box, limits.drawing);
   const auto edges = topology.edges, edge_cells = topology.edge_cells;
   const auto& rule = limits.rule;
   const auto& weights = limits.step.weights;
-  const double sigma = drawing.sigma;
-  Array<double, 2> sums(drawing.sums);
+  Array<bool, 1> is_read({sums.size()});
+  for (Index e = 0; e < is_read.size(); ++e) is_read[e] = sums(e, 0) > 0.0;
   ShiftGradients gradients = shift_gradients(sums);
   const double blur_px = blur_after_step(sigma, blur_change(sums, state.weight, weights), weights);
   update_for_blur(sums, gradients, blur_px - sigma);
@@ -19,7 +23,7 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   Array<double, 1> dot_gain_offset =
       update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
   EliminatedBending bent = update_for_bending(
-      sums, gradients, {drawing.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
+      sums, gradients, {state.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
       lines, edges, state.noise, rule, limits.step);
   const Array<double, 1> pardon = bending_misfit(bent.variance, contrasts, sigma, limits.step.bending);
   GridlineWeights weighed =
@@ -29,16 +33,26 @@ SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& 
   const Array<double, 2> curved = curving(topology.end_couplings, state.scatter.share, bent.response);
   const GridlineSystem system{sums,  weighed.weight,  lines, contrasts,     curved,
                               edges, topology.spokes, sigma, noise * noise, state.scatter.share};
-  WeighedSolution solved = solve_weighed(system, gradients, drawing.bend,
+  WeighedSolution solved = solve_weighed(system, gradients, state.bend,
                                          {topology, state.xy, state.hidden, bent.response}, limits.step);
-  return {std::move(weighed.weight),
-          std::move(solved.variance_ratio),
+  LevelArrays after = levels_at_blur(levels_of(corrected), state.xy, topology.cells, topology.cell_color,
+                                     sigma, blur_px, limits.drawing.bleed);
+  ReadGridlines reading{std::move(lines),
+                        std::move(sides),
+                        std::move(added),
+                        std::move(weighed.weight),
+                        std::move(solved.variance_ratio),
+                        std::move(dot_gain_offset),
+                        sigma,
+                        noise};
+  return {std::move(reading),
+          as_tuple(std::move(solved.solution)),
           std::move(bent.variance),
           dot_gain,
-          std::move(dot_gain_offset),
           blur_px,
-          noise,
-          as_tuple(std::move(solved.solution))};
+          std::move(after),
+          std::move(is_read),
+          edge_px};
 }
 
 }  // namespace cmp::refine

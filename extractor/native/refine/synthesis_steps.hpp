@@ -17,20 +17,25 @@ struct SynthesisLimits {
   MisfitRule rule;
   StepLimits step;
   DotGainLimits dot_gain;
+  DrawingLimits drawing;
 
   template <class F>
   static SynthesisLimits read(const F& f) {
-    return {f["rule"], f["step"], f["dot_gain"]};
+    return {f["rule"], f["step"], f["dot_gain"], f["drawing"]};
   }
 };
 
-// weight, variance_ratio, bend_variance, dot_gain, dot_gain_offset, sigma, noise and solution of
-// SynthesisReading.
-using SynthesisReading = std::tuple<Array<double, 1>, Array<double, 1>, Array<double, 1>, double,
-                                    Array<double, 1>, double, double, SolutionArrays>;
+// The fields of GridlineReading.
+using ReadGridlines = std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 2>, Array<double, 1>,
+                                 Array<double, 1>, Array<double, 1>, double, double>;
 
-// The measurements along the gridlines of a drawing, and the solution.
-SynthesisReading update_and_solve(const Synthesis& drawing, const PatternState& state,
-                                  const layout::Topology& topology, const SynthesisLimits& limits);
+// The fields of SynthesisStep.
+using SynthesisStep = std::tuple<ReadGridlines, SolutionArrays, Array<double, 1>, double, double, LevelArrays,
+                                 Array<bool, 1>, double>;
+
+// Draws the pattern into the picture (H, W, 3), compares it with the image, and solves for the markers.
+SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topology& topology,
+                             View<float, 3> picture, const PatternState& state, const InkLevels& levels,
+                             const SynthesisLimits& limits);
 
 }  // namespace cmp::refine

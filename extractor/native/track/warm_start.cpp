@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "numbering/marker_places.hpp"
 #include "numeric/bilinear.hpp"
 #include "track/image_check.hpp"
 
@@ -101,7 +102,13 @@ VerifiedMarkers verified_markers(View<const double, 2> xy, View<const bool, 1> p
       copy<double, 1>(xy[m], kept[m]);
     }
   }
-  return {std::move(kept), std::move(verified_count), std::move(cell_count)};
+  Array<bool, 1> agreed({count}), is_intact({count});
+  for (Index m = 0; m < count; ++m) {
+    const numbering::CornerAgreement agreement(verified_count[m], cell_count[m]);
+    agreed[m] = agreement.agreed;
+    is_intact[m] = agreement.is_intact;
+  }
+  return {std::move(kept), std::move(agreed), std::move(is_intact)};
 }
 
 }  // namespace cmp::track

@@ -20,9 +20,9 @@ struct WarmStartLimits {
   }
 };
 
-// The markers (M, 2), NaN where no proved cell has a corner; the numbers (M,) of proved cells and of all
-// cells.
-using VerifiedMarkers = std::tuple<Array<double, 2>, Array<std::int64_t, 1>, Array<std::int64_t, 1>>;
+// The markers (M, 2), NaN where no proved cell has a corner; agreed (M,) and is_intact (M,) of
+// InitialMarkers.
+using VerifiedMarkers = std::tuple<Array<double, 2>, Array<bool, 1>, Array<bool, 1>>;
 
 // Number of cells in view, and of those whose middle matches their own ink better than the two others.
 //

@@ -71,11 +71,3 @@ def short_edge(xy: NDArray[np.float64], edges: NDArray[np.int32], rarity: int) -
 def median_edge(xy: NDArray[np.float64], edges: NDArray[np.int32]) -> float:
     """The median length, px, of the edges (E, 2) between the markers (M, 2), px; 1 without any."""
     return float(native.median_edge(np.ascontiguousarray(xy), np.ascontiguousarray(edges), LIMITS))
-
-
-def pattern_box(xy: NDArray[np.float64], margin: float, width: int, height: int) -> NDArray[np.int64]:
-    """(4,) px, x from, y from, x to, y to: the part of the image with the pattern and a margin, px.
-
-    ``xy`` (M, 2) px, NaN where unknown; zeros where no marker is known.
-    """
-    return np.asarray(native.pattern_box(np.ascontiguousarray(xy), margin, width, height))

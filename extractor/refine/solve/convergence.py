@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -42,43 +41,55 @@ def remaining_share(sigma: float, edge_px: float) -> float:
     return BLUR_REMAINDER * (sigma / edge_px) ** 2
 
 
-def convergence_covariance(
-    shift: NDArray[np.float64], last: NDArray[np.float64], sigma: float, remaining_share: float
-) -> NDArray[np.float64]:
-    """The covariance of the remaining error after the last step.
+class StepRemainder(NamedTuple):
+    """A step of M markers, and the error that the step leaves.
+
+    Attributes:
+        shift: (M, 2) px, the step.
+        cov_px2: (M, 2, 2) px^2, the covariance of the remaining error; NaN where unknown.
+        error: RMS of all known markers, in standard deviations of one axis; 0 where none is known.
+    """
+
+    shift: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    error: float
+
+
+def step_remainder(
+    measured: NDArray[np.float64],
+    drawn: NDArray[np.float64],
+    last: NDArray[np.float64],
+    sigma: float,
+    remaining_share: float,
+    information: Information,
+) -> StepRemainder:
+    """The remaining error after the last step.
 
     The drawing responds less than linearly to shifts of the size of the blur. A marker whose steps shrink slowly is as
     far from its place as the steps that would follow (a geometric series).
 
     Args:
-        shift: (M, 2) px, the last step.
+        measured, drawn: (M, 2) px, the markers after the step and before.
         last: (M, 2) px, the step before, NaN where there was none.
         sigma: the blur, px.
         remaining_share: share of a usual step that always remains.
-
-    Returns:
-        (M, 2, 2) px^2.
-    """
-    covariance: NDArray[np.float64] = native.convergence_covariance(
-        shift, last, sigma, remaining_share, LIMITS
-    )
-    return covariance
-
-
-def remaining_error(covariance: NDArray[np.float64], information: Information) -> float:
-    """The remaining error, RMS of all known markers, in standard deviations of one axis; 0 where none is known.
-
-    Args:
-        covariance: (M, 2, 2) px^2, of the remaining error; NaN where unknown.
         information: about the markers.
     """
-    xx, xy, yy = information.diagonal.T
-    square = xx * covariance[:, 0, 0] + 2 * xy * covariance[:, 0, 1] + yy * covariance[:, 1, 1]
-    known = square[np.isfinite(square)]
-    return math.sqrt(0.5 * float(known.mean())) if known.size else 0.0
+    step = measured, drawn, last, sigma, remaining_share
+    return StepRemainder(*native.step_remainder(*step, information.diagonal, LIMITS))
 
 
-def typical_deviation(information: Information) -> float:
-    """The deviation of one axis, px, that the information allows a typical marker; 0 without any."""
-    traces = information.diagonal[:, 0] + information.diagonal[:, 2]
-    return math.sqrt(2.0 / float(np.median(traces))) if traces.size else 0.0
+def typical_bending(
+    bend: NDArray[np.float64], is_read: NDArray[np.bool_], information: Information
+) -> float:
+    """The RMS bending of the gridlines that are read, in deviations of a typical marker.
+
+    Args:
+        bend: (E, 2) px.
+        is_read: (E,) bool.
+        information: about the markers.
+
+    Returns:
+        Infinity where no gridline is read.
+    """
+    return float(native.typical_bending(bend, is_read, information.diagonal))

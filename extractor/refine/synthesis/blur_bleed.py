@@ -42,21 +42,3 @@ def remove_bleed(
         share: (K,) the share of each neighbour; ``median_share`` stands for NaN.
     """
     return InkLevels(*native.remove_bleed(levels, color, share, median_share, LIMITS))
-
-
-def levels_at_blur(
-    levels: InkLevels,
-    xy: NDArray[np.float64],
-    cells: NDArray[np.int32],
-    color: NDArray[np.int32],
-    drawn_sigma: float,
-    sigma: float,
-) -> InkLevels:
-    """The levels in the cells' middles with the blur ``sigma`` instead of ``drawn_sigma``, px.
-
-    Args:
-        levels: levels with ``drawn_sigma``.
-        xy: (M, 2) px, the markers.
-        cells, color: as ``cells`` and ``cell_color`` in ``Topology``.
-    """
-    return InkLevels(*native.levels_at_blur(levels, xy, cells, color, drawn_sigma, sigma, LIMITS))

@@ -16,7 +16,6 @@ void add_measure(nb::module_ module) {
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
   bind<&short_edge>(module, "short_edge", {"xy", "edges", "rarity"});
   bind<&median_edge>(module, "median_edge", {"xy", "edges", "limits"});
-  bind<&pattern_box>(module, "pattern_box", {"xy", "margin", "width", "height"});
 }
 
 }  // namespace cmp::refine

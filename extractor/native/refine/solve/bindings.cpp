@@ -7,8 +7,9 @@
 namespace cmp::refine {
 
 void add_solve(nb::module_ module) {
-  bind<&convergence_covariance>(module, "convergence_covariance",
-                                {"shift", "last", "sigma", "remaining_share", "limits"});
+  bind<&step_remainder>(module, "step_remainder",
+                        {"measured", "drawn", "last", "sigma", "remaining_share", "diagonal", "limits"});
+  bind<&typical_bending>(module, "typical_bending", {"bend", "is_read", "diagonal"});
   bind<&solve_shifts>(module, "solve_shifts",
                       {"diagonal", "off_diagonal", "edges", "right", "whole", "limits"});
   bind<&covariances>(

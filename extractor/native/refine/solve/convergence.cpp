@@ -1,6 +1,7 @@
 #include "refine/solve/convergence.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "numeric/median.hpp"
 
@@ -25,10 +26,9 @@ double following_steps(double x, double y, double last_x, double last_y, double 
   return shrinking / (1.0 - shrinking);
 }
 
-}  // namespace
-
-Array<double, 3> convergence_covariance(View<const double, 2> shift, View<const double, 2> last, double sigma,
-                                        double remaining_share, const ConvergenceLimits& limits) {
+// The covariances (M, 2, 2) px^2 of the error after a step of shifts (M, 2) px.
+Array<double, 3> remaining_covariance(View<const double, 2> shift, View<const double, 2> last, double sigma,
+                                      double remaining_share, const ConvergenceLimits& limits) {
   const Index count = shift.size();
   Array<double, 3> out({count, 2, 2}, 0.0);
   Array<double, 1> square({count});
@@ -53,6 +53,54 @@ Array<double, 3> convergence_covariance(View<const double, 2> shift, View<const 
     }
   }
   return out;
+}
+
+// The error of all known markers, RMS, in standard deviations of one axis; 0 where none is known.
+double typical_error(View<const double, 3> cov, View<const double, 2> diagonal) {
+  double total = 0.0;
+  Index count = 0;
+  for (Index m = 0; m < cov.size(); ++m) {
+    const double square =
+        diagonal(m, 0) * cov(m, 0, 0) + 2 * diagonal(m, 1) * cov(m, 0, 1) + diagonal(m, 2) * cov(m, 1, 1);
+    if (!std::isfinite(square)) continue;
+    total += square;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(0.5 * total / static_cast<double>(count)) : 0.0;
+}
+
+// The deviation of one axis, px, that the information allows a typical marker; NaN without any.
+double typical_deviation(View<const double, 2> diagonal) {
+  Array<double, 1> traces({diagonal.size()});
+  for (Index m = 0; m < diagonal.size(); ++m) traces[m] = diagonal(m, 0) + diagonal(m, 2);
+  return std::sqrt(2.0 / numeric::median_of_many(traces));
+}
+
+}  // namespace
+
+StepRemainder step_remainder(View<const double, 2> measured, View<const double, 2> drawn,
+                             View<const double, 2> last, double sigma, double remaining_share,
+                             View<const double, 2> diagonal, const ConvergenceLimits& limits) {
+  Array<double, 2> shift({measured.size(), 2});
+  for (Index m = 0; m < measured.size(); ++m) {
+    for (Index axis = 0; axis < 2; ++axis) shift(m, axis) = measured(m, axis) - drawn(m, axis);
+  }
+  Array<double, 3> cov = remaining_covariance(shift, last, sigma, remaining_share, limits);
+  const double error = typical_error(cov, diagonal);
+  return {std::move(shift), std::move(cov), error};
+}
+
+double typical_bending(View<const double, 2> bend, View<const bool, 1> is_read,
+                       View<const double, 2> diagonal) {
+  double total = 0.0;
+  Index count = 0;
+  for (Index e = 0; e < is_read.size(); ++e) {
+    if (!is_read[e]) continue;
+    total += bend(e, 0) * bend(e, 0) + bend(e, 1) * bend(e, 1);
+    count += 2;
+  }
+  if (count == 0) return std::numeric_limits<double>::infinity();
+  return std::sqrt(total / static_cast<double>(count)) / typical_deviation(diagonal);
 }
 
 }  // namespace cmp::refine

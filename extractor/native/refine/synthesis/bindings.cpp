@@ -13,8 +13,6 @@ void add_synthesis(nb::module_ module) {
   bind<&local_maps>(module, "local_maps", {"xy", "near", "offset", "stencil", "limits"});
   bind<&level_change>(module, "level_change", {"before", "now"});
   bind<&remove_bleed>(module, "remove_bleed", {"levels", "color", "share", "median_share", "limits"});
-  bind<&levels_at_blur>(module, "levels_at_blur",
-                        {"levels", "xy", "cells", "color", "drawn_sigma", "sigma", "limits"});
   bind<&markers_without_dot_gain>(module, "markers_without_dot_gain", {"xy", "cells", "dot_gain", "limits"});
 }
 
