@@ -26,6 +26,6 @@ class Schedule(NamedTuple):
 
 SCHEDULES: dict[Preset, Schedule] = {
     "fast": Schedule(2, 0.5, 0.5),
-    "balanced": Schedule(6, 0.5, 0.4),
+    "balanced": Schedule(6, 0.5, 0.25),
     "accurate": Schedule(8, 1.2, 0.1),
 }
