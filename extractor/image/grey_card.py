@@ -55,6 +55,7 @@ class GreyCard:
 
     Attributes:
         gain, offset: (3, h, w) float32, channels B, G, R: in white light, a value v would be gain * v + offset.
+            1 and 0 where the light counts as white.
         tile_px: side of a tile in px of the full image.
         ratio: of the strongest channel's mean over black, in the whole pattern, to the weakest one's; 1 without a
             pattern.

@@ -74,9 +74,7 @@ class Pyramid:
 
 
 def _pyramid_level(image: NDArray[np.uint8], scale: int, response: ResponseTables) -> PyramidLevel:
-    if scale == 2:
-        image = native.halved(image, response.light_steps, response.value_of_steps)
-    elif scale > 1:
+    if scale > 1:
         image = native.block_means(image, scale, response.light_steps, response.value_of_steps)
     height, width = image.shape[:2]
     frame = PolynomialFrame(0.5 * width, 0.5 * height, 0.5 * max(width, height))

@@ -16,7 +16,6 @@ from extractor.refine.drawn_pattern import LIMITS as DRAWING_LIMITS
 from extractor.refine.drawn_pattern import DrawingLimits
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.gridline_weights import median_edge
 from extractor.refine.measure.marker_scatter import NO_SCATTER
 from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
@@ -30,15 +29,14 @@ from extractor.refine.refinement_step import (
     with_solution,
 )
 from extractor.refine.solve.convergence import (
-    bending_change,
     remaining_share,
     step_remainder,
+    typical_bending,
 )
 from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
 from extractor.refine.synthesis.dot_gain import DotGainLimits
 from extractor.refine.synthesis.ink_levels import InkLevels
 
-WIDE_BLUR = 0.1  # of a usual edge: above, the errors of neighbours look like bending. Chosen
 MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
 
 
@@ -54,8 +52,8 @@ class SynthesisLimits(NamedTuple):
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
             follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
             0.15 in the second step. Measured: rule "settled appearance".
-        small_bend: RMS change of the gridlines' bending in a step after which no step may follow, in deviations of a
-            marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
+        small_bend: RMS of the gridlines' bending, which the first step does not follow, after which no step may follow, in
+            deviations of a marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
     """
 
     max_steps: int = 4
@@ -68,11 +66,6 @@ class SynthesisLimits(NamedTuple):
 
 
 LIMITS = SynthesisLimits()
-
-
-def is_blur_wide(sigma: float, edge_px: float) -> bool:
-    """Whether a usual edge, px, is blurred into the next by the blur, px."""
-    return sigma > WIDE_BLUR * edge_px
 
 
 class SynthesisStep(NamedTuple):
@@ -149,27 +142,22 @@ class SynthesisSolver:
         return estimate._replace(convergence_cov_px2=cov)
 
     def _drawn(self, estimate: Estimate) -> Estimate:
-        """The estimate with its pattern at the markers of the last step, and with gridlines that may bend.
-
-        With wide blur, gridlines would bend instead of correcting the markers beside them.
-        """
+        """The estimate with its pattern at the markers of the last step, and with gridlines that may bend."""
         moved = with_pattern_moved(self._topology, estimate)
-        if is_blur_wide(moved.sigma, median_edge(moved.xy, self._topology.edges)):
-            return _without_bending(moved)
         return with_bending(self._topology, moved, scatter_of(self._topology, moved))
 
     def _is_settled(self, before: Estimate, after: Estimate, step: SynthesisStep) -> bool:
         """Whether the next drawing would differ from the last one by small moves of the markers only.
 
-        Blur or dot gain that has changed, gridlines that bend, and markers that scatter are drawn otherwise.
+        Blur or dot gain that has changed, bending that was not drawn, and markers that scatter are drawn otherwise.
         """
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
         if change_px >= LIMITS.small_change * before.sigma:
             return False
-        # with wide blur no gridline bends
-        if bending_change(before.bend, after.bend, step.is_read, after.information) >= LIMITS.small_bend:
-            return False
-        return is_blur_wide(before.sigma, step.edge_px) or scatter_of(self._topology, after) == NO_SCATTER
+        if not before.bend.any():
+            if typical_bending(after.bend, step.is_read, after.information) >= LIMITS.small_bend:
+                return False
+        return scatter_of(self._topology, after) == NO_SCATTER
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, SynthesisStep]:
         """A step from all measurements: the pattern is drawn, compared with the image, and solved for."""
@@ -190,9 +178,3 @@ class SynthesisSolver:
             dot_gain=step.dot_gain,
         )
         return after, step
-
-
-def _without_bending(estimate: Estimate) -> Estimate:
-    """The estimate with gridlines that may not bend."""
-    roughness, bend = np.zeros_like(estimate.roughness), np.zeros_like(estimate.bend)
-    return estimate._replace(roughness=roughness, bend=bend, scatter=NO_SCATTER)

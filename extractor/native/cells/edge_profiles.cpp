@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/processor.hpp"
 #include "image/response.hpp"
 #include "numeric/bilinear.hpp"
 
@@ -11,8 +12,6 @@ namespace {
 
 using image::light_at;
 using numeric::BATCH_POINTS;
-
-constexpr auto SAMPLE_SHARE = static_cast<float>(1.0 / (numeric::SUBPIXEL_STEPS * numeric::SUBPIXEL_STEPS));
 
 // Writes the inks' colors from the cells' middles.
 void fill_ink_colors(const ProfileImage& image, View<double, 1> edges, Index cells,
@@ -45,16 +44,19 @@ void fill_background_colors(const ProfileImage& image, View<double, 1> edges, In
   numeric::fill_patch_means(image.flat, image.height, image.width, count, buffers);
 }
 
-// Writes the fixed-point beginnings of the first or second profiles; (0, 0) for invalid edges.
-void fill_profile_starts(bool second, View<const double, 1> edges, Index count,
+// Writes the fixed-point beginnings and steps of the first or second profiles; 0 for invalid edges.
+void fill_profile_starts(bool second, View<const double, 1> edges, Index count, double half,
                          View<std::int64_t, 1> points) {
   const Index middle_x = second ? SECOND_X : FIRST_X, middle_y = second ? SECOND_Y : FIRST_Y;
   for (Index i = 0; i < count; ++i) {
     const bool is_valid = edges[VALID + i] > 0.0;
-    const double x = edges[middle_x + i] - edges[REACH + i] * edges[MEDIAN_X + i];
-    const double y = edges[middle_y + i] - edges[REACH + i] * edges[MEDIAN_Y + i];
+    const double reach = edges[REACH + i], step = is_valid ? reach / half : 0.0;
+    const double x = edges[middle_x + i] - reach * edges[MEDIAN_X + i];
+    const double y = edges[middle_y + i] - reach * edges[MEDIAN_Y + i];
     points[numeric::X + i] = numeric::fixed_point_coordinate(is_valid ? x : 0.0);
     points[numeric::Y + i] = numeric::fixed_point_coordinate(is_valid ? y : 0.0);
+    points[numeric::STEP_X + i] = numeric::fixed_point_length(step * edges[MEDIAN_X + i]);
+    points[numeric::STEP_Y + i] = numeric::fixed_point_length(step * edges[MEDIAN_Y + i]);
   }
 }
 
@@ -113,11 +115,8 @@ void fill_profile_areas(const ProfileImage& image, bool second, View<double, 1> 
   const auto light = image.light;
   const auto half = static_cast<double>(limits.half_profile);
   const double lowest = limits.min_profile_level, highest = limits.max_profile_level;
-  fill_profile_starts(second, edges, count, points);
+  run_loop<fill_profile_starts>(second, edges, count, half, points);
   for (Index i = 0; i < count; ++i) {
-    const double step = edges[VALID + i] > 0.0 ? edges[REACH + i] / half : 0.0;
-    edges[STEP_X + i] = step * edges[MEDIAN_X + i];
-    edges[STEP_Y + i] = step * edges[MEDIAN_Y + i];
     edges[AREA_BEFORE + i] = edges[AREA + i];
     edges[AREA + i] = 0.0;
   }
@@ -128,14 +127,14 @@ void fill_profile_areas(const ProfileImage& image, bool second, View<double, 1> 
     for (Index i = 0; i < count; ++i) {
       const double u0 = edges[WEIGHT + i], u1 = edges[WEIGHT + BATCH_POINTS + i];
       const double u2 = edges[WEIGHT + 2 * BATCH_POINTS + i];
-      double f = u0 * light_at(light, SAMPLE_SHARE * parts[numeric::BLUE + i]) +
-                 u1 * light_at(light, SAMPLE_SHARE * parts[numeric::GREEN + i]);
-      f += u2 * light_at(light, SAMPLE_SHARE * parts[numeric::RED + i]) - edges[BACKGROUND + i];
+      double f = u0 * light[numeric::nearest_value(parts[numeric::BLUE + i])] +
+                 u1 * light[numeric::nearest_value(parts[numeric::GREEN + i])];
+      f += u2 * light[numeric::nearest_value(parts[numeric::RED + i])] - edges[BACKGROUND + i];
       edges[AREA + i] += weight * std::min(std::max(f, lowest), highest);
     }
     for (Index i = 0; i < count; ++i) {
-      points[numeric::X + i] += numeric::fixed_point_length(edges[STEP_X + i]);
-      points[numeric::Y + i] += numeric::fixed_point_length(edges[STEP_Y + i]);
+      points[numeric::X + i] += points[numeric::STEP_X + i];
+      points[numeric::Y + i] += points[numeric::STEP_Y + i];
     }
   }
 }

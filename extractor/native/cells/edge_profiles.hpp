@@ -23,13 +23,13 @@ inline constexpr Index MEDIAN_X = column(11), MEDIAN_Y = column(12);
 inline constexpr Index INK = column(13), WEIGHT = column(16), BACKGROUND = column(19);
 // 1 if the edge is valid, else 0
 inline constexpr Index VALID = column(20);
-// the profiles' middles, their step, and the areas under them
+// the profiles' middles, and the areas under them
 inline constexpr Index FIRST_X = column(21), FIRST_Y = column(22), SECOND_X = column(23),
                        SECOND_Y = column(24);
-inline constexpr Index STEP_X = column(25), STEP_Y = column(26), AREA = column(27), AREA_BEFORE = column(28);
+inline constexpr Index AREA = column(25), AREA_BEFORE = column(26);
 // the line n . p = d
-inline constexpr Index LINE_X = column(29), LINE_Y = column(30), LINE_D = column(31);
-inline constexpr Index COLUMNS = 32;
+inline constexpr Index LINE_X = column(27), LINE_Y = column(28), LINE_D = column(29);
+inline constexpr Index COLUMNS = 30;
 
 // An image as the samples take it.
 struct ProfileImage {

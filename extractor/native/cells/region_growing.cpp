@@ -8,14 +8,16 @@ constexpr int HUES = 180;  // OpenCV's 8-bit hue counts in steps of 2 degrees
 constexpr std::int32_t BORDER = -1;
 
 // The difference of two hues, unwrapped to the nearer side.
-double hue_difference(double hue, double from) {
-  double difference = hue - from;
-  return difference + (difference < -HUES / 2 ? HUES : difference >= HUES / 2 ? -HUES : 0);
+template <class T>
+T hue_difference(T hue, T from) {
+  const T difference = hue - from;
+  const T turn = difference < -HUES / 2 ? HUES : 0, back = difference >= HUES / 2 ? HUES : 0;
+  return difference + (turn - back);
 }
 
-// Sums of hue, saturation and value; hue is counted from the seed's.
+// Sums of hue, saturation and value, and their means; hue is counted from the seed's.
 struct ColorSums {
-  double seed_hue, hue = 0.0, saturation, value;
+  std::int64_t seed_hue, hue = 0, saturation, value;
   double mean_hue, mean_saturation, mean_value;
 
   explicit ColorSums(const std::uint8_t* hsv)
@@ -27,21 +29,22 @@ struct ColorSums {
         mean_value(hsv[2]) {}
 
   bool is_similar(const std::uint8_t* hsv, double limit2) const {
-    double dh = hue_difference(hsv[0], mean_hue), ds = hsv[1] - mean_saturation, dv = hsv[2] - mean_value;
+    double dh = hue_difference<double>(hsv[0], mean_hue), ds = hsv[1] - mean_saturation,
+           dv = hsv[2] - mean_value;
     double scale = (mean_hue + dh) * mean_hue + hsv[1] * mean_saturation + hsv[2] * mean_value;
     return dh * dh + ds * ds + dv * dv < limit2 * scale;
   }
   void add(const std::uint8_t* hsv, bool is_added) {
-    hue += is_added ? hue_difference(hsv[0], seed_hue) : 0.0;
-    saturation += is_added ? hsv[1] : 0.0;
-    value += is_added ? hsv[2] : 0.0;
+    hue += is_added * hue_difference<std::int64_t>(hsv[0], seed_hue);
+    saturation += is_added * hsv[1];
+    value += is_added * hsv[2];
   }
   void update_means(Index count) {
     auto n = static_cast<double>(count);
-    mean_hue = seed_hue + hue / n;
+    mean_hue = static_cast<double>(seed_hue) + static_cast<double>(hue) / n;
     mean_hue += mean_hue < 0.0 ? HUES : mean_hue >= HUES ? -HUES : 0;
-    mean_saturation = saturation / n;
-    mean_value = value / n;
+    mean_saturation = static_cast<double>(saturation) / n;
+    mean_value = static_cast<double>(value) / n;
   }
 };
 
@@ -59,6 +62,7 @@ void update_to_coordinates(View<std::int32_t, 1> queue, View<std::int32_t, 1> fr
 void fill_moments(View<const std::int32_t, 1> x_of, View<const std::int32_t, 1> y_of, Index count,
                   std::int32_t x0, std::int32_t y0, View<double, 1> moments) {
   double m1 = 0.0, m2 = 0.0, m3 = 0.0, m4 = 0.0, m5 = 0.0, m6 = 0.0, m7 = 0.0, m8 = 0.0, m9 = 0.0;
+#pragma omp simd reduction(+ : m1, m2, m3, m4, m5, m6, m7, m8, m9)
   for (Index i = 0; i < count; ++i) {
     double x = x_of[i] - x0, y = y_of[i] - y0;
     double xx = x * x, yy = y * y;
@@ -82,8 +86,10 @@ GrownRegions grow(View<const std::uint8_t, 3> hsv, View<const std::uint8_t, 2> l
                   View<const std::int32_t, 2> seed_xy, View<const std::uint8_t, 1> seed_ink, Index limit_px,
                   const GrowLimits& limits) {
   const auto height = label.size(0), width = label.size(1), framed_width = width + 2;
-  Array<std::int32_t, 2> owner({height + 2, framed_width}, BORDER);
-  for (Index y = 1; y <= height; ++y) owner[y].slice(1, width + 1).fill(0);
+  Array<std::int32_t, 2> owner({height + 2, framed_width}, 0);
+  owner[0].fill(BORDER);
+  owner[height + 1].fill(BORDER);
+  for (Index y = 1; y <= height; ++y) owner(y, 0) = owner(y, width + 1) = BORDER;
   Array<double, 2> moments({seed_xy.size(), MOMENT_TERMS}, 0.0);
   Array<std::int32_t, 1> queue({limit_px + 2});   // indices of pixels in the image
   Array<std::int32_t, 1> framed({limit_px + 2});  // indices of the same pixels in the framed map
@@ -110,15 +116,15 @@ GrownRegions grow(View<const std::uint8_t, 3> hsv, View<const std::uint8_t, 2> l
           const Index to = framed_pixels[i] + framed_steps[side];
           if (owners[to] != 0) continue;
           const Index pixel = pixels[i] + steps[side];
-          if (end > limit_px || (labels[pixel] != ink && labels[pixel] != 0)) continue;
           const std::uint8_t* color = &colors[3 * pixel];
-          const bool is_similar = sums.is_similar(color, limit2);
+          const bool is_free = (labels[pixel] == ink) | (labels[pixel] == 0);
+          const bool is_added = is_free & (end <= limit_px) & sums.is_similar(color, limit2);
           // a rejected pixel is overwritten: in noise, a branch would be unpredictable
           pixels[end] = static_cast<std::int32_t>(pixel);
           framed_pixels[end] = static_cast<std::int32_t>(to);
-          owners[to] = is_similar ? own : 0;
-          end += is_similar;
-          sums.add(color, is_similar);
+          owners[to] = is_added * own;
+          end += is_added;
+          sums.add(color, is_added);
         }
       }
       begin = wave_end;

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "numeric/bilinear.hpp"
+#include "numeric/bilinear_batch.hpp"
 #include "numeric/median.hpp"
 
 namespace cmp::complete {
@@ -26,6 +26,7 @@ constexpr double LAB_STRAIGHT = 0.008856451679035631;  // (6 / 29)^3
 constexpr double LAB_SLOPE = 7.787037037037035;        // (29 / 6)^2 / 3
 constexpr double LAB_OFFSET = 4.0 / 29.0;
 
+using numeric::BATCH_POINTS;
 using Lights = std::array<double, CHANNELS>;  // BGR
 
 double sum(const Lights& light) { return light[0] + light[1] + light[2]; }
@@ -79,17 +80,32 @@ struct CellValues {
   CellValues(View<const std::uint8_t, 3> image, View<const double, 2> center,
              View<const std::uint8_t, 1> color, double radius, double clipped_value)
       : values({COLORS, CHANNELS, center.size()}) {
-    const auto flat = image.flat();
-    const Index height = image.size(0), width = image.size(1);
-    std::array<double, CHANNELS> own;
-    for (Index i = 0; i < center.size(); ++i) {
-      if (!numeric::fill_patch_mean(flat, height, width, center(i, 0), center(i, 1), radius,
-                                    View<double, 1>(own.data(), {CHANNELS})))
-        continue;
-      const Index k = color[i], place = count[k]++;
-      for (Index channel = 0; channel < CHANNELS; ++channel) values(k, channel, place) = own[channel];
-      clipped += k < INKS && std::max(std::max(own[0], own[1]), own[2]) >= clipped_value ? 1 : 0;
+    auto buffers = numeric::allocate_sample_buffers();
+    for (Index first = 0; first < center.size(); first += BATCH_POINTS) {
+      const auto points = center.slice(first, std::min(first + BATCH_POINTS, center.size()));
+      const auto patches = buffers.patches.view();
+      for (Index i = 0; i < points.size(); ++i) {
+        patches[numeric::X + i] = points(i, 0);
+        patches[numeric::Y + i] = points(i, 1);
+        patches[numeric::RADIUS + i] = radius;
+      }
+      numeric::fill_patch_means(image.flat(), image.size(0), image.size(1), points.size(), buffers);
+      for (Index i = 0; i < points.size(); ++i)
+        if (patches[numeric::INSIDE + i] > 0.0)
+          add(patches.from(numeric::COLOR + i), color[first + i], clipped_value);
     }
+  }
+
+  // Adds the value of a cell, of which the channels lie BATCH_POINTS apart.
+  void add(View<const double, 1> own, Index k, double clipped_value) {
+    const Index place = count[k]++;
+    double largest = 0.0;
+    for (Index channel = 0; channel < CHANNELS; ++channel) {
+      const double value = own[channel * BATCH_POINTS];
+      values(k, channel, place) = value;
+      largest = std::max(largest, value);
+    }
+    clipped += k < INKS && largest >= clipped_value ? 1 : 0;
   }
 
   Index colored() const { return count[0] + count[1] + count[2]; }

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "refine/synthesis/gridlines.hpp"
-
 namespace cmp::complete {
 
 namespace {
@@ -28,17 +26,12 @@ struct GridlineEnds {
   refine::MarkerScatter scatter;
 };
 
-// The map's derivative along the edge at marker a, towards b, px per edge; the chord where it is unknown.
-Vector edge_tangent(const GridlineEnds& ends, const layout::Topology& topology, Index a, Index b,
-                    Vector chord) {
-  const auto map = ends.maps[a];
+// The derivative of the map at marker m along `edge`, a vector of the layout, px per edge; the chord where it
+// is unknown.
+Vector edge_tangent(const GridlineEnds& ends, Index m, Vector edge, Vector chord) {
+  const auto map = ends.maps[m];
   if (!std::isfinite(map(0, 0))) return chord;
-  for (Index k = 0; k < refine::FIRST_RING; ++k) {
-    if (topology.ring_markers(a, k) != b) continue;
-    const double u = topology.ring_vectors(a, k, 0), v = topology.ring_vectors(a, k, 1);
-    return {map(0, 0) * u + map(0, 1) * v, map(1, 0) * u + map(1, 1) * v};
-  }
-  return chord;
+  return {map(0, 0) * edge.x + map(0, 1) * edge.y, map(1, 0) * edge.x + map(1, 1) * edge.y};
 }
 
 // The second derivatives of the map at marker m along edge e, px; 0 where they are unknown.
@@ -77,8 +70,9 @@ struct Gridline {
         cov_b(ends.cov_px2[b]) {
     length = std::sqrt(chord.x * chord.x + chord.y * chord.y);
     along = {chord.x / length, chord.y / length};
-    leaving = edge_tangent(ends, topology, a, b, chord);
-    arriving = edge_tangent(ends, topology, b, a, {-chord.x, -chord.y});
+    const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
+    leaving = edge_tangent(ends, a, {u, v}, chord);
+    arriving = edge_tangent(ends, b, {-u, -v}, {-chord.x, -chord.y});
     if (ends.scatter.share == 0.0) return;
     const Vector at_a = curvature(ends, topology, a, e), at_b = curvature(ends, topology, b, e);
     update_for_scatter(leaving, chord, at_a, at_b, ends.scatter.share);
@@ -210,12 +204,12 @@ VirtualMarkers locate_on_edges(const LocatedMarkers& markers, const refine::Mark
     const Gridline gridline(ends, topology, e, a, b);
     const double free_variance = ends.scatter.bend_variance(topology.scatter_bending[e]);
     const double limit_px = limits.max_measured_offset * gridline.length;
-    const bool by_stencil = weights.is_by_stencil(a) && weights.is_by_stencil(b);
     for (Index j = 0; j < m; ++j) {
       const double t = static_cast<double>(j + 1) / static_cast<double>(m + 1);
       Located point = gridline.at(t, limits.bend_uncertainty, free_variance);
       gridline.update_to_measured(points[e][j], limit_px, point);
-      if (point.status == INTERPOLATED && by_stencil) weights.update_covariance(e, t, point);
+      if (point.status == INTERPOLATED && weights.is_by_stencil(a) && weights.is_by_stencil(b))
+        weights.update_covariance(e, t, point);
       status(e, j) = point.status;
       xy(e, j, 0) = gridline.x0 + point.x;
       xy(e, j, 1) = gridline.y0 + point.y;

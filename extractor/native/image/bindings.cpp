@@ -20,7 +20,6 @@ void add_image(nb::module_ module) {
   bind<&segment>(module, "segment", {"hue", "chroma", "target", "nominal_deg", "limits"});
   bind<&estimate_noise>(module, "estimate_noise", {"image", "xy", "cells", "limits"});
   bind<&block_means>(module, "block_means", {"image", "scale", "light_steps", "value_of_steps"});
-  bind<&halved>(module, "halved", {"image", "light_steps", "value_of_steps"});
   bind<&tile_chroma>(module, "tile_chroma", {"chroma", "tile_px"});
   bind<&target_mask>(module, "target_mask", {"chroma", "limits"});
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 namespace cmp::image {
@@ -14,15 +15,26 @@ constexpr Index CHANNELS = 3;
 constexpr Index MEAN = 0, SMALLEST = 3, SQUARE = 6, PRODUCT = 9, PLANES = 12;
 // planes of what is smoothed: means and blacks times weights, and the weights
 constexpr Index BLACK = 3, WEIGHT = 6, WEIGHTED_PLANES = 7;
-constexpr double REACH = 3.0;  // of the smoothing, in sigmas
+constexpr double WHITE = 255.0;  // the largest value
+constexpr double REACH = 3.0;    // of the smoothing, in sigmas
 
 using Plane = View<const float, 2>;
 
-// Calls visit(y, x) for the tile and its neighbours.
-template <class Visit>
-void for_neighbours(Index row, Index column, Index rows, Index columns, Visit visit) {
-  for (Index y = std::max<Index>(row - 1, 0); y < std::min(row + 2, rows); ++y)
-    for (Index x = std::max<Index>(column - 1, 0); x < std::min(column + 2, columns); ++x) visit(y, x);
+// Writes each tile's value combined with those of its eight neighbours; combine(one, nothing) is `one`.
+template <class Combine>
+void fill_combined(Plane plane, double nothing, Combine combine, View<double, 2> out) {
+  const auto rows = plane.size(0), columns = plane.size(1);
+  Array<double, 1> padded({columns + 2}, nothing);
+  const auto line = padded.view();
+  for (Index row = 0; row < rows; ++row) {
+    std::fill_n(line.begin() + 1, columns, nothing);
+    for (Index y = std::max<Index>(row - 1, 0); y < std::min(row + 2, rows); ++y) {
+      const auto own = plane[y];
+      for (Index x = 0; x < columns; ++x) line[x + 1] = combine(line[x + 1], static_cast<double>(own[x]));
+    }
+    const auto combined = out[row];
+    for (Index x = 0; x < columns; ++x) combined[x] = combine(combine(line[x], line[x + 1]), line[x + 2]);
+  }
 }
 
 // The sums of one tile.
@@ -46,38 +58,56 @@ struct TileSums {
   }
 };
 
-// How independently the channels vary around a tile: the sum, over the pairs of channels, of the product of
-// their deviations less their covariance. It is 0 where all channels vary alike.
-float independent_variation(View<const float, 3> statistics, Index row, Index column) {
-  std::array<double, PLANES> mean{};
-  double count = 0.0;
-  for_neighbours(row, column, statistics.size(1), statistics.size(2), [&](Index y, Index x) {
-    for (Index plane = 0; plane < PLANES; ++plane) mean[plane] += statistics(plane, y, x);
-    count += 1.0;
-  });
-  for (double& one : mean) one /= count;
-  std::array<double, CHANNELS> deviation{};
-  for (Index c = 0; c < CHANNELS; ++c)
-    deviation[c] = std::sqrt(std::max(mean[SQUARE + c] - mean[MEAN + c] * mean[MEAN + c], 0.0));
-  double total = 0.0;
-  for (Index c = 0; c < CHANNELS; ++c) {
-    const Index other = (c + 1) % CHANNELS;
-    const double covariance = mean[PRODUCT + c] - mean[MEAN + c] * mean[MEAN + other];
-    total += std::max(deviation[c] * deviation[other] - covariance, 0.0);
+// (12, rows, columns): the statistics' means over each tile and its neighbours.
+Array<double, 3> neighbourhood_means(View<const float, 3> statistics) {
+  const Array<float, 2> ones({statistics.size(1), statistics.size(2)}, 1.0F);
+  Array<double, 2> tiles(ones.shape());
+  fill_combined(ones, 0.0, std::plus<>(), tiles);
+  Array<double, 3> means(statistics.shape());
+  for (Index plane = 0; plane < PLANES; ++plane) {
+    fill_combined(statistics[plane], 0.0, std::plus<>(), means[plane]);
+    const auto mean = means[plane].flat(), count = tiles.flat();
+    for (Index i = 0; i < mean.size(); ++i) mean[i] /= count[i];
   }
-  return static_cast<float>(total);
+  return means;
+}
+
+// How independently the channels vary around each tile of a row: the sum, over the pairs of channels, of the
+// product of their deviations less their covariance. It is 0 where all channels vary alike.
+Array<double, 1> independent_variation(View<const double, 3> means, Index row) {
+  const auto columns = means.size(2);
+  Array<double, 1> variation({columns}, 0.0);
+  Array<double, 2> deviation({CHANNELS, columns});
+  for (Index c = 0; c < CHANNELS; ++c) {
+    const auto mean = means[MEAN + c][row], square = means[SQUARE + c][row];
+    const auto own = deviation[c];
+    for (Index x = 0; x < columns; ++x) own[x] = std::sqrt(std::max(square[x] - mean[x] * mean[x], 0.0));
+  }
+  for (Index c = 0; c < CHANNELS; ++c) {
+    const Index next = (c + 1) % CHANNELS;
+    const auto mean = means[MEAN + c][row], other = means[MEAN + next][row],
+               product = means[PRODUCT + c][row];
+    const auto own = deviation[c], others = deviation[next], total = variation.view();
+    for (Index x = 0; x < columns; ++x) {
+      const double covariance = product[x] - mean[x] * other[x];
+      total[x] += std::max(own[x] * others[x] - covariance, 0.0);
+    }
+  }
+  return variation;
 }
 
 // Weights (rows, columns) from 0 to 1: 1/2 where the variation is a share of the typical one, which is the
 // mean weighted by the variation itself, so that it does not matter how much of the image the pattern fills.
 Array<float, 2> pattern_weights(View<const float, 3> statistics, double half_share) {
   const auto rows = statistics.size(1), columns = statistics.size(2);
+  const auto means = neighbourhood_means(statistics);
   Array<float, 2> weight({rows, columns});
   double total = 0.0, squares = 0.0;
   for (Index row = 0; row < rows; ++row) {
-    for (Index column = 0; column < columns; ++column) {
-      const double one = independent_variation(statistics, row, column);
-      weight(row, column) = static_cast<float>(one);
+    const auto variation = independent_variation(means, row);
+    for (Index x = 0; x < columns; ++x) {
+      weight(row, x) = static_cast<float>(variation[x]);
+      const double one = weight(row, x);
       total += one;
       squares += one * one;
     }
@@ -124,19 +154,19 @@ std::vector<float> gaussian_half_kernel(double sigma, Index longest) {
 Array<float, 3> weighted_planes(View<const float, 3> statistics, View<const float, 2> weight) {
   const auto rows = statistics.size(1), columns = statistics.size(2);
   Array<float, 3> planes({WEIGHTED_PLANES, rows, columns});
-  for (Index row = 0; row < rows; ++row) {
-    for (Index column = 0; column < columns; ++column) {
-      const float own = weight(row, column);
-      planes(WEIGHT, row, column) = own;
-      for (Index c = 0; c < CHANNELS; ++c) {
-        float black = 255.0F;
-        for_neighbours(row, column, rows, columns,
-                       [&](Index y, Index x) { black = std::min(black, statistics(SMALLEST + c, y, x)); });
+  Array<double, 2> black({rows, columns});
+  const auto darkest = [](double one, double other) { return std::min(one, other); };
+  for (Index c = 0; c < CHANNELS; ++c) {
+    fill_combined(statistics[SMALLEST + c], WHITE, darkest, black);
+    for (Index row = 0; row < rows; ++row) {
+      for (Index column = 0; column < columns; ++column) {
+        const float own = weight(row, column);
         planes(MEAN + c, row, column) = own * statistics(MEAN + c, row, column);
-        planes(BLACK + c, row, column) = own * black;
+        planes(BLACK + c, row, column) = own * static_cast<float>(black(row, column));
       }
     }
   }
+  copy(weight, planes[WEIGHT]);
   return planes;
 }
 
@@ -172,6 +202,17 @@ struct LocalLight {
     return std::min(std::max(wanted, 1.0), limits.max_gain);
   }
 };
+
+// The ratio of the strongest channel's mean over black, in the whole pattern, to the weakest one's; total:
+// the sums of the weighted planes.
+double pattern_ratio(const std::array<double, WEIGHTED_PLANES>& total, double min_level) {
+  LocalLevels whole{};
+  for (Index c = 0; c < CHANNELS; ++c) {
+    whole.mean[c] = total[MEAN + c] / total[WEIGHT];
+    whole.black[c] = total[BLACK + c] / total[WEIGHT];
+  }
+  return LocalLight(whole, min_level).ratio();
+}
 
 // The tiles whose middles lie before and behind a pixel along one axis.
 struct TilePair {
@@ -236,6 +277,8 @@ GreyCardFields grey_card_fields(View<const float, 3> statistics, const GreyCardL
   std::array<double, WEIGHTED_PLANES> total{};
   for (Index plane = 0; plane < WEIGHTED_PLANES; ++plane) total[plane] = sum_of(planes[plane]);
   if (!(total[WEIGHT] > 0.0)) return {std::move(gain), std::move(offset), 1.0};
+  const double ratio = pattern_ratio(total, limits.min_level);
+  if (ratio <= limits.white_ratio) return {std::move(gain), std::move(offset), ratio};
   const double sigma = limits.sigma_share * static_cast<double>(std::min(rows, columns));
   const auto half_kernel = gaussian_half_kernel(sigma, std::max(rows, columns));
   double kernel_sum = -1.0;
@@ -265,12 +308,6 @@ GreyCardFields grey_card_fields(View<const float, 3> statistics, const GreyCardL
       }
     }
   }
-  LocalLevels whole{};
-  for (Index c = 0; c < CHANNELS; ++c) {
-    whole.mean[c] = total[MEAN + c] / total[WEIGHT];
-    whole.black[c] = total[BLACK + c] / total[WEIGHT];
-  }
-  const double ratio = LocalLight(whole, limits.min_level).ratio();
   return {std::move(gain), std::move(offset), ratio};
 }
 

@@ -12,13 +12,14 @@ struct GreyCardLimits {
   double sigma_share;
   double half_weight_share;
   double rest_weight_share;
+  double white_ratio;
   double ink_ratio;
   double min_level;
   double max_gain;
 
   template <class F>
   static GreyCardLimits read(const F& f) {
-    return {f["sigma_share"], f["half_weight_share"], f["rest_weight_share"],
+    return {f["sigma_share"], f["half_weight_share"], f["rest_weight_share"], f["white_ratio"],
             f["ink_ratio"],   f["min_level"],         f["max_gain"]};
   }
 };
@@ -32,7 +33,7 @@ using GreyCardFields = std::tuple<Array<float, 3>, Array<float, 3>, double>;
 // `step`-th one of every `step`-th row counts; image (H, W, 3).
 Array<float, 3> tile_statistics(View<const std::uint8_t, 3> image, Index tile_px, Index step);
 
-// The fields by the statistics (12, rows, columns) of tiles.
+// The fields by the statistics (12, rows, columns) of tiles; gain 1 and offset 0 in white light.
 GreyCardFields grey_card_fields(View<const float, 3> statistics, const GreyCardLimits& limits);
 
 // (H, W, 3) value * gain + offset, rounded and clipped; the fields (3, rows, columns) of tiles of tile_px

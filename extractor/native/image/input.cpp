@@ -13,20 +13,20 @@ namespace {
 constexpr std::array<std::array<Index, 2>, 9> NEIGHBOUR_PIXELS{
     {{0, 0}, {1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 1}, {-1, 1}, {-1, -1}, {1, -1}}};
 constexpr Index REACH_PX = 2;                // of the sampled pixels' masks from a cell's middle
-constexpr Index LARGEST = 255;               // value of 8 bits
+constexpr std::int32_t LARGEST = 255;        // value of 8 bits
 constexpr Index MASK_SUM = 8;                // of the positive weights of the mask
 constexpr double MASK_GAIN = 6.0;            // from the noise to the deviation of the mask's response
 constexpr double MEDIAN_OF_NORMAL = 0.6745;  // of the size of a normal variable with deviation 1
 
 // The mask's response at a pixel of one channel; -1 where one of its pixels is clipped.
-Index response_at(View<const std::uint8_t, 3> image, Index x, Index y, Index channel) {
-  Index response = 0, low = LARGEST, high = 0;
+std::int32_t response_at(View<const std::uint8_t, 3> image, Index x, Index y, Index channel) {
+  std::int32_t response = 0, low = LARGEST, high = 0;
   for (Index dy = -1; dy < 2; ++dy) {
-    const Index left = image(y + dy, x - 1, channel), middle = image(y + dy, x, channel);
-    const Index right = image(y + dy, x + 1, channel);
+    const std::uint8_t* const pixels = &image(y + dy, x - 1, channel);
+    const std::int32_t left = pixels[0], middle = pixels[3], right = pixels[6];
     low = std::min(std::min(low, left), std::min(middle, right));
     high = std::max(std::max(high, left), std::max(middle, right));
-    const Index row = left - 2 * middle + right;
+    const std::int32_t row = left - 2 * middle + right;
     response += dy == 0 ? -2 * row : row;
   }
   return low > 0 && high < LARGEST ? std::abs(response) : -1;
@@ -50,7 +50,7 @@ double estimate_noise(View<const std::uint8_t, 3> image, View<const double, 2> x
       const Index x = static_cast<Index>(cx + 0.5) + NEIGHBOUR_PIXELS[k][0];
       const Index y = static_cast<Index>(cy + 0.5) + NEIGHBOUR_PIXELS[k][1];
       for (Index channel = 0; channel < 3; ++channel) {
-        const Index response = response_at(image, x, y, channel);
+        const std::int32_t response = response_at(image, x, y, channel);
         if (response < 0) continue;
         ++counts[response];
         ++total;

@@ -34,8 +34,4 @@ Array<std::uint8_t, 3> block_means(View<const std::uint8_t, 3> image, Index scal
                                    View<const std::uint16_t, 1> light_steps,
                                    View<const std::uint8_t, 1> value_of_steps);
 
-// The same for 2 x 2 pixels, in half of the time.
-Array<std::uint8_t, 3> halved(View<const std::uint8_t, 3> image, View<const std::uint16_t, 1> light_steps,
-                              View<const std::uint8_t, 1> value_of_steps);
-
 }  // namespace cmp::image

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstring>
 
+#include "base/processor.hpp"
 #include "numeric/bilinear.hpp"
 
 namespace cmp::numeric {
@@ -99,13 +100,14 @@ void begin_patches(double width, double height, View<double, 1> patches, Index c
 }  // namespace
 
 SampleBuffers allocate_sample_buffers() {
-  return {Array<std::int64_t, 1>({3 * BATCH_POINTS}, 0), Array<std::uint32_t, 1>({4 * BATCH_POINTS}, 0),
+  return {Array<std::int64_t, 1>({5 * BATCH_POINTS}, 0), Array<std::uint32_t, 1>({4 * BATCH_POINTS}, 0),
           Array<float, 1>({5 * BATCH_POINTS}, 0.0F), Array<double, 1>({7 * BATCH_POINTS}, 0.0)};
 }
 
 void fill_point_samples(View<const std::uint8_t, 1> flat, Index height, Index width, Index count,
                         SampleBuffers& buffers) {
-  fill_pixel_indices(height, width, buffers.fixed_points, buffers.channel_sums, count);
+  run_loop<fill_pixel_indices>(height, width, buffers.fixed_points.view(), buffers.channel_sums.view(),
+                               count);
   fill_pixel_words(flat, width, buffers.fixed_points, buffers.pixel_words, count);
   fill_channel_sums(buffers.pixel_words, buffers.channel_sums, count);
 }
@@ -117,7 +119,7 @@ void fill_patch_means(View<const std::uint8_t, 1> flat, Index height, Index widt
   const auto w = static_cast<double>(width), h = static_cast<double>(height);
   begin_patches(w, h, patches, count);
   for (const auto& point : HEXAGON_POINTS) {
-    fill_hexagon_points(w, h, point, patches, buffers.fixed_points, count);
+    run_loop<fill_hexagon_points>(w, h, point, patches, buffers.fixed_points.view(), count);
     fill_point_samples(flat, height, width, count, buffers);
     for (Index channel = 0; channel < 3; ++channel) {
       const Index column = channel * BATCH_POINTS;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "base/array.hpp"
+#include "numeric/bilinear.hpp"
 
 namespace cmp::numeric {
 
@@ -12,6 +13,7 @@ inline constexpr std::int64_t HALF_STEP = 1 << 23;       // 0.5 / SUBPIXEL_STEPS
 inline constexpr Index BATCH_POINTS = 192;               // points sampled together at most
 // Begins of columns: of `fixed_points`,
 inline constexpr Index X = 0, Y = BATCH_POINTS, PIXEL_INDEX = 2 * BATCH_POINTS;
+inline constexpr Index STEP_X = 3 * BATCH_POINTS, STEP_Y = 4 * BATCH_POINTS;
 // of `channel_sums`,
 inline constexpr Index BLUE = 0, GREEN = BATCH_POINTS, RED = 2 * BATCH_POINTS;
 inline constexpr Index FRACTION_X = 3 * BATCH_POINTS, FRACTION_Y = 4 * BATCH_POINTS;
@@ -20,8 +22,8 @@ inline constexpr Index RADIUS = 2 * BATCH_POINTS, COLOR = 3 * BATCH_POINTS, INSI
 
 // Memory for P = BATCH_POINTS samples; every array consists of columns of P.
 struct SampleBuffers {
-  // (3 P,) columns X and Y, by fixed_point_coordinate, and PIXEL_INDEX, the flat index of the first of four
-  // pixels
+  // (5 P,) columns X and Y, by fixed_point_coordinate, PIXEL_INDEX, the flat index of the first of four
+  // pixels, and STEP_X and STEP_Y, from one point to the next, by fixed_point_length
   Array<std::int64_t, 1> fixed_points;
   Array<std::uint32_t, 1> pixel_words;  // (4 P,) bytes of the four pixels
   // (5 P,) columns BLUE, GREEN and RED, each channel times the square of SUBPIXEL_STEPS, and FRACTION_X and
@@ -39,6 +41,12 @@ inline std::int64_t fixed_point_coordinate(double place_px) {
 // A length as an integer multiple of 2^-32 px.
 inline std::int64_t fixed_point_length(double length_px) {
   return static_cast<std::int64_t>(length_px * FIXED_POINT_ONE);
+}
+
+// The whole value next to a channel's sum.
+inline std::int32_t nearest_value(float sum) {
+  constexpr std::int32_t ONE = SUBPIXEL_STEPS * SUBPIXEL_STEPS;
+  return (static_cast<std::int32_t>(sum) + ONE / 2) / ONE;
 }
 
 // SampleBuffers of zeros.

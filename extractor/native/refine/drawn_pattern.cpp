@@ -32,11 +32,14 @@ LevelArrays corrected_levels(const DrawingInput& input, const InkLevels& levels,
   return smoothed_levels(own, means(topology.black_cells), xy, cells, input.state.noise, view, limits);
 }
 
-// Subtracts `others` and divides by `divisor`.
-void update_difference(Array<double, 2>& values, const Array<double, 2>& others, double divisor) {
-  const auto own = values.flat();
-  const auto other = others.view().flat();
-  for (Index k = 0; k < own.size(); ++k) own[k] = (own[k] - other[k]) / divisor;
+// The change of levels since `before`, in units of `unit`.
+template <int N>
+Array<double, N> change(View<const double, N> now, View<const double, N> before, double unit) {
+  Array<double, N> out(now);
+  const auto own = out.flat();
+  const auto other = before.flat();
+  for (Index k = 0; k < own.size(); ++k) own[k] = (own[k] - other[k]) / unit;
+  return out;
 }
 
 }  // namespace
@@ -55,13 +58,16 @@ DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topolog
   draw_cells({xy, cells, topology.cell_edges, edges, lines}, {levels.cell, levels.slope, sigma}, box,
              picture);
   LevelArrays corrected = corrected_levels({view, topology, picture, state}, levels, limits.levels);
-  Array<double, 2> added = beside.light(levels_of(corrected));
-  update_difference(added, sides, 1.0);
-  beside.add_black(added, levels.black);
-  const LevelArrays wider = levels_at_blur(levels, xy, cells, topology.cell_color, sigma,
-                                           (1.0 + limits.blur_step) * sigma, limits.bleed);
-  Array<double, 2> bleed = beside.light(levels_of(wider));
-  update_difference(bleed, sides, limits.blur_step);
+  // the drawing lacks the black, and the change of the levels since
+  const auto& [cell, slope, black, is_outlier] = corrected;
+  Array<double, 2> added = beside.light(
+      {change<2>(cell, levels.cell, 1.0), change<3>(slope, levels.slope, 1.0), black, is_outlier});
+  const double step = limits.blur_step;
+  const auto [wider_cell, wider_slope, wider_black, _] =
+      levels_at_blur(levels, xy, cells, topology.cell_color, sigma, (1.0 + step) * sigma, limits.bleed);
+  const Array<double, 2> bleed =
+      beside.light({change<2>(wider_cell, levels.cell, step), change<3>(wider_slope, levels.slope, step),
+                    change<2>(wider_black, levels.black, step), levels.is_outlier});
   const Array<bool, 1> bending = bending_gridlines(state.roughness, state.bend, edges);
   Array<double, 2> sums =
       accumulate_residual_sums(view, picture, {lines, sides, added, bleed, bending}, sigma, box, limits.rows);

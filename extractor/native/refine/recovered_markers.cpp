@@ -154,7 +154,7 @@ void fill_recovered_markers(const image::PyramidLevel& view, const PatternState&
                               state.sigma,
                               state.noise * state.noise,
                               state.scatter.share};
-  InformationArrays information = fisher_information(system, prior, false, step.information);
+  InformationArrays information = fisher_information(system, prior);
   const Array<double, 2> measured = shifted_markers(
       system, information, read.gradients.start.slice(0, count), read.gradients.end.slice(0, count),
       selected_rows(state.xy, own.markers.view()), step.information);

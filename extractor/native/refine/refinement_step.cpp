@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "refine/synthesis/residual_kernel.hpp"
+
 namespace cmp::refine {
 
 namespace {
@@ -20,11 +22,18 @@ struct Equations {
   Array<double, 2> gradient;
 
   Equations(const GridlineSystem& of, const ShiftGradients& gradients, View<const bool, 1> hidden,
-            bool overlapping, const StepLimits& step)
+            const StepLimits& step)
       : system(of),
         limits(step),
-        information(fisher_information(of, prior_information(hidden, step), overlapping, step.information)),
+        information(fisher_information(of, prior_information(hidden, step))),
         gradient(refine::gradient(of, gradients.start, gradients.end)) {}
+
+  // The same for sums that include the gridlines' ends, where gridlines share pixels.
+  Equations(const GridlineSystem& of, const ShiftGradients& gradients, View<const bool, 1> hidden,
+            const SharedPixels& shared, const StepLimits& step)
+      : Equations(of, gradients, hidden, step) {
+    shared.add_information(of, information.diagonal, information.off_diagonal);
+  }
 
   // The shifts (M, 2) px by a part of the gradient.
   Array<double, 2> solved(View<const double, 2> part) const {
@@ -80,13 +89,24 @@ EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradi
     variance = most * most;
     bend_variance = estimate_bend_variance(sums, gradients, prior, lines, edges, variance, limits.bending);
   }
-  auto response = update_without_bending(sums, gradients, prior.bend, bend_variance, variance);
+  if (has_any(prior.bend)) {
+    auto response = update_without_bending(sums, gradients, prior.bend, bend_variance, variance);
+    return {std::move(bend_variance), std::move(response)};
+  }
+  Array<double, 2> own(sums);
+  ShiftGradients own_gradients = gradients.copy();
+  auto response = update_without_bending(own, own_gradients, prior.bend, bend_variance, variance);
+  for (Index e = 0; e < sums.size(); ++e) {
+    response(e, HELD) = 1.0;
+    sums(e, READ_AA) = sums(e, AA);
+    sums(e, READ_BB) = sums(e, BB);
+  }
   return {std::move(bend_variance), std::move(response)};
 }
 
 StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& gradients,
                         View<const double, 2> bend, const CurvedGridlines& curved, const StepLimits& limits) {
-  Equations equations(system, gradients, curved.hidden, false, limits);
+  Equations equations(system, gradients, curved.hidden, limits);
   Array<double, 2> shift = equations.solved(equations.gradient);
   const CurvedGradients bent = curved_gradients(system, gradients, curved, shift, limits.gridlines);
   return equations.solution(std::move(shift), bent.others, bend, curved);
@@ -95,16 +115,17 @@ StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& grad
 WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,
                               View<const double, 2> bend, const CurvedGridlines& curved,
                               const StepLimits& limits) {
-  // that gridlines share pixels hardly changes where they disagree
-  const Equations equations(system, gradients, curved.hidden, false, limits);
+  const SharedPixels shared(system, limits.information.shared);
+  const Equations equations(system, gradients, curved.hidden, shared, limits);
   Array<double, 2> shift = equations.solved(equations.gradient);
-  const CurvedGradients bent = curved_gradients(system, gradients, curved, shift, limits.gridlines);
+  CurvedGradients bent = curved_gradients(system, gradients, curved, shift, limits.gridlines);
+  shared.explain(system, shift, bent.left);
   Array<double, 1> ratio = variance_ratios(system, bent.left, shift, limits.disagreement);
   Array<double, 1> weight({ratio.size()});
   for (Index e = 0; e < weight.size(); ++e) weight[e] = system.weight[e] / ratio[e];
   GridlineSystem weighed = system;
   weighed.weight = weight;
-  Equations judged(weighed, gradients, curved.hidden, true, limits);
+  Equations judged(weighed, gradients, curved.hidden, shared, limits);
   WeighedSolution out{std::move(ratio), judged.solution(std::move(shift), bent.others, bend, curved)};
   const Array<double, 2> of_covariance =
       curving(curved.topology.covariance_couplings, system.scatter_share, curved.bend_response);

@@ -70,9 +70,10 @@ using ExtrapolatedPattern = std::tuple<Array<double, 2>, Array<bool, 1>, Array<d
 ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::Topology& topology,
                                         const GridlineLimits& limits);
 
-// Eliminates the bending of gridlines from the sums (E, 24) and the gradients.
+// Eliminates the bending of gridlines from the sums (E, 24) and the gradients, once bending is drawn.
 //
-// lines (E, 8) and edges (E, 2); noise, gray levels, one channel.
+// Before, bending is measured only: the errors of markers look like bending, and markers that would not be
+// held by their gridlines would keep them. // lines (E, 8) and edges (E, 2); noise, gray levels, one channel.
 EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradients,
                                      const BendingPrior& prior, View<const double, 2> lines,
                                      View<const std::int32_t, 2> edges, double noise, const MisfitRule& rule,

@@ -79,20 +79,17 @@ def step_remainder(
     return StepRemainder(*native.step_remainder(*step, information.diagonal, LIMITS))
 
 
-def bending_change(
-    before: NDArray[np.float64],
-    after: NDArray[np.float64],
-    is_read: NDArray[np.bool_],
-    information: Information,
+def typical_bending(
+    bend: NDArray[np.float64], is_read: NDArray[np.bool_], information: Information
 ) -> float:
-    """The RMS change of the bending (E, 2) px of the gridlines that are read, in deviations of a typical marker.
+    """The RMS bending of the gridlines that are read, in deviations of a typical marker.
 
     Args:
-        before, after: the bending.
+        bend: (E, 2) px.
         is_read: (E,) bool.
         information: about the markers.
 
     Returns:
         Infinity where no gridline is read.
     """
-    return float(native.bending_change(before, after, is_read, information.diagonal))
+    return float(native.typical_bending(bend, is_read, information.diagonal))

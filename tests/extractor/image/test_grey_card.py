@@ -55,6 +55,7 @@ def test_in_white_light_the_image_stays_the_same() -> None:
     image = picture().image
     card = find_grey_card(image, 1)
     assert card.is_white and 1.0 <= card.ratio < 1.3
+    assert (card.gain == 1.0).all() and (card.offset == 0.0).all()
     assert remove_light_color(image, card, 1) is image
 
 

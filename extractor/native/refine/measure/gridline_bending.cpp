@@ -67,7 +67,7 @@ void fill_lane(Index m, Index lane, View<const double, 2> squares, View<const st
         square = missing % 2 == 0 ? -INFINITE : INFINITE;
         ++missing;
       }
-      column[row][lane] = square;
+      column[row][lane] = static_cast<float>(square);
     }
   }
 }
@@ -125,8 +125,8 @@ Array<double, 1> measure_roughness(View<const double, 2> xy, View<const double, 
     if (filled < SORT_LANES && (filled == 0 || m < spokes.size() - 1)) continue;
     column.sort();
     for (Index k = 0; k < filled; ++k) {
-      const double lower = column[SORT_ROWS / 2 - 1][k], upper = column[SORT_ROWS / 2][k];
-      const double middle = is_odd[k] ? upper : 0.5 * (lower + upper);
+      const float lower = column[SORT_ROWS / 2 - 1][k], upper = column[SORT_ROWS / 2][k];
+      const auto middle = static_cast<double>(is_odd[k] ? upper : 0.5F * (lower + upper));
       out[marker[k]] = std::max(limits.mean_over_median * middle - noise, 0.0);
     }
     filled = 0;

@@ -89,22 +89,29 @@ struct InkSide {
 // station.
 void update_without_profiles(View<double, 3> offsets, View<const double, 2> contrasts,
                              const OffsetLimits& limits) {
-  Array<double, 1> outward({offsets.size()});
-  Array<std::int64_t, 1> gridlines({offsets.size()});
+  const Index edges = offsets.size();
+  std::vector<InkSide> sides;
+  sides.reserve(static_cast<std::size_t>(edges));
+  for (Index e = 0; e < edges; ++e) sides.emplace_back(contrasts[e]);
+  const auto outward = [&](Index e) { return sides[static_cast<std::size_t>(e)].outward; };
+  Array<double, 1> known({edges});
+  Array<std::int64_t, 1> numbers({edges});
   for (Index color = 0; color < COLORS; ++color) {
+    Index of_color = 0;
+    for (Index e = 0; e < edges; ++e) {
+      numbers[of_color] = e;
+      of_color += sides[static_cast<std::size_t>(e)].color == color ? 1 : 0;
+    }
+    const auto gridlines = numbers.slice(0, of_color);
     for (Index j = 0; j < offsets.size(1); ++j) {
       Index count = 0;
-      for (Index e = 0; e < offsets.size(); ++e) {
-        const InkSide ink(contrasts[e]);
-        if (ink.color != color || std::isnan(offsets(e, j, OFFSET))) continue;
-        outward[count] = ink.outward * offsets(e, j, OFFSET);
-        gridlines[count++] = e;
+      for (const Index e : gridlines) {
+        known[count] = outward(e) * offsets(e, j, OFFSET);
+        count += std::isnan(known[count]) ? 0 : 1;
       }
       if (count <= limits.min_profile_gridlines) continue;
-      const double profile = numeric::median_of_many(outward.slice(0, count));
-      for (const Index e : gridlines.first(count)) {
-        offsets(e, j, OFFSET) -= InkSide(contrasts[e]).outward * profile;
-      }
+      const double profile = numeric::median_of_many(known.slice(0, count));
+      for (const Index e : gridlines) offsets(e, j, OFFSET) -= outward(e) * profile;
     }
   }
 }

@@ -36,6 +36,8 @@ struct GridlineWeightLimits {
 // Gradients of the log-likelihood by shifts of the gridlines' ends, times the noise's variance.
 struct ShiftGradients {
   Array<double, 1> start, end;  // (E,) gray levels^2 / px, by a shift of each end along the normal (-uy, ux)
+
+  ShiftGradients copy() const { return {Array<double, 1>(start.view()), Array<double, 1>(end.view())}; }
 };
 
 // The weights of the gridlines.

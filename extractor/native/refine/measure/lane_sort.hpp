@@ -16,7 +16,7 @@ inline constexpr Index SORT_LANES = 64;                        // columns at onc
 // Numbers in rows; each lane is a column.
 class LaneColumn {
  public:
-  using Row = std::array<double, SORT_LANES>;
+  using Row = std::array<float, SORT_LANES>;
 
   LaneColumn() { std::iota(places_.begin(), places_.end(), 0); }
   Row& operator[](Index row) { return rows_[places_[row]]; }

@@ -9,7 +9,7 @@ namespace cmp::refine {
 void add_solve(nb::module_ module) {
   bind<&step_remainder>(module, "step_remainder",
                         {"measured", "drawn", "last", "sigma", "remaining_share", "diagonal", "limits"});
-  bind<&bending_change>(module, "bending_change", {"before", "after", "is_read", "diagonal"});
+  bind<&typical_bending>(module, "typical_bending", {"bend", "is_read", "diagonal"});
   bind<&solve_shifts>(module, "solve_shifts",
                       {"diagonal", "off_diagonal", "edges", "right", "whole", "limits"});
   bind<&covariances>(

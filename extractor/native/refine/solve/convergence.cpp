@@ -90,13 +90,13 @@ StepRemainder step_remainder(View<const double, 2> measured, View<const double, 
   return {std::move(shift), std::move(cov), error};
 }
 
-double bending_change(View<const double, 2> before, View<const double, 2> after, View<const bool, 1> is_read,
-                      View<const double, 2> diagonal) {
+double typical_bending(View<const double, 2> bend, View<const bool, 1> is_read,
+                       View<const double, 2> diagonal) {
   double total = 0.0;
   Index count = 0;
   for (Index e = 0; e < is_read.size(); ++e) {
     if (!is_read[e]) continue;
-    for (Index k = 0; k < 2; ++k) total += (after(e, k) - before(e, k)) * (after(e, k) - before(e, k));
+    total += bend(e, 0) * bend(e, 0) + bend(e, 1) * bend(e, 1);
     count += 2;
   }
   if (count == 0) return std::numeric_limits<double>::infinity();

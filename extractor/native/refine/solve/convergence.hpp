@@ -31,9 +31,9 @@ StepRemainder step_remainder(View<const double, 2> measured, View<const double, 
                              View<const double, 2> last, double sigma, double remaining_share,
                              View<const double, 2> diagonal, const ConvergenceLimits& limits);
 
-// The RMS change of the bending (E, 2) px of the gridlines that are read, in deviations of a typical marker;
-// infinite where none is read. is_read (E,), diagonal (M, 3) 1/px^2.
-double bending_change(View<const double, 2> before, View<const double, 2> after, View<const bool, 1> is_read,
-                      View<const double, 2> diagonal);
+// The RMS bending (E, 2) px of the gridlines that are read, in deviations of a typical marker; infinite where
+// none is read. is_read (E,), diagonal (M, 3) 1/px^2.
+double typical_bending(View<const double, 2> bend, View<const bool, 1> is_read,
+                       View<const double, 2> diagonal);
 
 }  // namespace cmp::refine

@@ -62,10 +62,7 @@ CurvedGradients curved_gradients(const GridlineSystem& system, const ShiftGradie
                                  const GridlineLimits& limits) {
   const auto edges = system.edges;
   const Array<double, 3> maps = maps_of_shifts(curved, shift, limits);
-  const auto copy = [](const ShiftGradients& from) {
-    return ShiftGradients{Array<double, 1>(from.start.view()), Array<double, 1>(from.end.view())};
-  };
-  CurvedGradients out{copy(gradients), copy(gradients)};
+  CurvedGradients out{gradients.copy(), gradients.copy()};
   for (Index e = 0; e < edges.size(); ++e) {
     const auto sums = system.sums[e], own = system.curving[e];
     if (system.weight[e] * system.lines(e, KNOWN) == 0.0) continue;

@@ -117,8 +117,7 @@ Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
   return out;
 }
 
-InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
-                                     bool overlapping, const InformationLimits& limits) {
+InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior) {
   const auto edges = system.edges;
   InformationArrays out{Array<double, 2>({system.spokes.size(), 3}),
                         Array<double, 2>({edges.size(), 4}, 0.0)};
@@ -131,7 +130,6 @@ InformationArrays fisher_information(const GridlineSystem& system, View<const do
     const auto own = system.curving[e];
     add_gridline(system, e, {1.0 + own[0], 1.0 + own[1], 1.0 + own[BETWEEN]}, diagonal, off_diagonal);
   }
-  if (overlapping) add_shared_pixels(system, diagonal, off_diagonal, limits.shared);
   return out;
 }
 

@@ -61,10 +61,8 @@ Array<double, 2> curving(View<const double, 2> couplings, double scatter_share,
 
 // The information about the markers, with gridlines that curve with their own two ends.
 //
-// prior (M,) 1/px^2, before the measurement; overlapping, the sums include the gridlines' ends, where
-// gridlines share their pixels.
-InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior,
-                                     bool overlapping, const InformationLimits& limits);
+// prior (M,) 1/px^2, before the measurement. Pixels that gridlines share are not in it.
+InformationArrays fisher_information(const GridlineSystem& system, View<const double, 1> prior);
 
 // Changes the information to that of gridlines with this curving (E, 3) in the place of the system's.
 void update_curving(InformationArrays& information, const GridlineSystem& system,

@@ -15,10 +15,9 @@ inline double polynomial(const Form& form, double r) {
   return value;
 }
 
-// The overlap of near end with near end, of near end with the far end of the second gridline, and of near end
-// with the far end of the first.
+// The overlap of near end with near end, and of the near end of the other gridline with the far end of one.
 struct Overlap {
-  double near, far_second, far_first;
+  double near, far_first, far_second;
 };
 
 // The overlap of the derivatives by two gridlines that leave one marker at an angle; first and second, 1/px,
@@ -33,38 +32,76 @@ inline Overlap overlap(double cosine, double first, double second, double sigma,
   const double square = sigma * sigma * per * per * per * form / std::numbers::pi * first * second;
   const double plain = per * polynomial(limits.plain_form, r) / (2.0 * std::numbers::pi);
   const double near = plain - linear * (first + second) + square;
-  return {std::max(near, 0.0), linear * second - square, linear * first - square};
+  return {std::max(near, 0.0), linear * first - square, linear * second - square};
+}
+
+// Calls act(first, second, pair) for the pairs of gridlines at a marker.
+template <class Act>
+inline void for_pairs(const Act& act) {
+  std::size_t pair = 0;
+  for (std::size_t i = 0; i < MARKER_GRIDLINES; ++i) {
+    for (std::size_t j = i + 1; j < MARKER_GRIDLINES; ++j) act(i, j, pair++);
+  }
 }
 
 }  // namespace
 
-void accumulate_overlaps(MarkerGridlines& at, double sigma, const SharedPixelLimits& limits) {
+MarkerOverlaps overlaps_of(const AtMarkers<LaneGridlines>& at, double sigma,
+                           const SharedPixelLimits& limits) {
+  MarkerOverlaps out;
   const SharedPixelLimits own_limits = limits;
-  for (Index i = 0; i < MARKER_GRIDLINES; ++i) {
-    LaneGridlines one = at[i];  // a copy of its own cannot overlap the others, as the compiler sees
-    for (Index j = i + 1; j < MARKER_GRIDLINES; ++j) {
-      LaneGridlines& other = at[j];
-      for (Index k = 0; k < MARKER_LANES; ++k) {
-        const double color =
-            one.red[k] * other.red[k] + one.green[k] * other.green[k] + one.blue[k] * other.blue[k];
-        const double dot = color * std::min(one.weight[k], other.weight[k]);
-        const double cosine = one.x[k] * other.x[k] + one.y[k] * other.y[k];
-        const Overlap shared =
-            overlap(cosine, one.inverse_length[k], other.inverse_length[k], sigma, own_limits);
-        const double near = dot * shared.near, to_one = dot * shared.far_first,
-                     to_other = dot * shared.far_second;
-        one.near_x[k] += near * other.normal_x[k];
-        one.near_y[k] += near * other.normal_y[k];
-        one.far_x[k] += to_one * other.normal_x[k];
-        one.far_y[k] += to_one * other.normal_y[k];
-        other.near_x[k] += near * one.normal_x[k];
-        other.near_y[k] += near * one.normal_y[k];
-        other.far_x[k] += to_other * one.normal_x[k];
-        other.far_y[k] += to_other * one.normal_y[k];
-      }
+  for_pairs([&](std::size_t i, std::size_t j, std::size_t pair) {
+    const LaneGridlines &one = at[i], &other = at[j];
+    for (std::size_t k = 0; k < MARKER_LANES; ++k) {
+      const double color =
+          one.red[k] * other.red[k] + one.green[k] * other.green[k] + one.blue[k] * other.blue[k];
+      const double cosine = one.x[k] * other.x[k] + one.y[k] * other.y[k];
+      const Overlap own = overlap(cosine, one.inverse_length[k], other.inverse_length[k], sigma, own_limits);
+      out[pair].near[k] = color * own.near;
+      out[pair].far_first[k] = color * own.far_first;
+      out[pair].far_second[k] = color * own.far_second;
     }
-    at[i] = one;
-  }
+  });
+  return out;
+}
+
+AtMarkers<LaneInformation> information_of(const MarkerOverlaps& overlaps, const AtMarkers<LaneNormals>& at) {
+  AtMarkers<LaneInformation> out{};
+  for_pairs([&](std::size_t i, std::size_t j, std::size_t pair) {
+    const LaneNormals &one = at[i], &other = at[j];
+    LaneInformation &own = out[i], &others = out[j];
+    for (std::size_t k = 0; k < MARKER_LANES; ++k) {
+      const double weight = std::min(one.weight[k], other.weight[k]);
+      const double near = weight * overlaps[pair].near[k], to_one = weight * overlaps[pair].far_first[k],
+                   to_other = weight * overlaps[pair].far_second[k];
+      own.near_x[k] += near * other.x[k];
+      own.near_y[k] += near * other.y[k];
+      own.far_x[k] += to_one * other.x[k];
+      own.far_y[k] += to_one * other.y[k];
+      others.near_x[k] += near * one.x[k];
+      others.near_y[k] += near * one.y[k];
+      others.far_x[k] += to_other * one.x[k];
+      others.far_y[k] += to_other * one.y[k];
+    }
+  });
+  return out;
+}
+
+AtMarkers<LaneEnds> gradients_of(const MarkerOverlaps& overlaps, const AtMarkers<LaneEnds>& shift) {
+  AtMarkers<LaneEnds> out{};
+  for_pairs([&](std::size_t i, std::size_t j, std::size_t pair) {
+    const LaneEnds &one = shift[i], &other = shift[j];
+    LaneEnds &own = out[i], &others = out[j];
+    for (std::size_t k = 0; k < MARKER_LANES; ++k) {
+      const double near = overlaps[pair].near[k], to_one = overlaps[pair].far_first[k],
+                   to_other = overlaps[pair].far_second[k];
+      own.near[k] += near * other.near[k] + to_other * other.far[k];
+      own.far[k] += to_one * other.near[k];
+      others.near[k] += near * one.near[k] + to_one * one.far[k];
+      others.far[k] += to_other * one.near[k];
+    }
+  });
+  return out;
 }
 
 }  // namespace cmp::refine

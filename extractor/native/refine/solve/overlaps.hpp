@@ -8,26 +8,39 @@
 
 namespace cmp::refine {
 
-inline constexpr Index MARKER_LANES = 8;      // markers side by side
-inline constexpr Index MARKER_GRIDLINES = 6;  // at a marker at most
-
-// Gridlines that end at `MARKER_LANES` markers, one at each, with their sums; zero where a marker has fewer
-// gridlines.
+// Gridlines that end at `MARKER_LANES` markers, one at each; zero where a marker has fewer gridlines.
 struct LaneGridlines {
-  using Row = std::array<double, MARKER_LANES>;
-  Row x, y;                // direction away from the marker
-  Row red, green, blue;    // contrast, gray levels
-  Row weight;              // 0 to 1
-  Row inverse_length;      // 1/px
-  Row normal_x, normal_y;  // over the variance of the noise
-  // sums over the other gridlines of their normals times the overlap of near end with near end, and of their
-  // near end with this one's far end
-  Row near_x, near_y, far_x, far_y;
+  LaneRow x, y;              // direction away from the marker
+  LaneRow red, green, blue;  // contrast, gray levels
+  LaneRow inverse_length;    // 1/px
 };
 
-using MarkerGridlines = std::array<LaneGridlines, MARKER_GRIDLINES>;
+// Their normals, and their weights over the variance of the noise.
+struct LaneNormals {
+  LaneRow x, y, weight;
+};
 
-// Adds the overlaps of all gridlines at each marker to their sums; sigma, the blur, px.
-void accumulate_overlaps(MarkerGridlines& at, double sigma, const SharedPixelLimits& limits);
+// The sums over the other gridlines of their normals times the overlap of near end with near end, and of
+// their near end with this gridline's far end.
+struct LaneInformation {
+  LaneRow near_x, near_y, far_x, far_y;
+};
+
+// Values at their near and at their far ends.
+struct LaneEnds {
+  LaneRow near, far;
+};
+
+template <class Lanes>
+using AtMarkers = std::array<Lanes, MARKER_GRIDLINES>;
+
+// The overlaps of all pairs of gridlines at each marker; sigma, the blur, px.
+MarkerOverlaps overlaps_of(const AtMarkers<LaneGridlines>& at, double sigma, const SharedPixelLimits& limits);
+
+// The information that the overlaps add; of two gridlines, the smaller weight counts.
+AtMarkers<LaneInformation> information_of(const MarkerOverlaps& overlaps, const AtMarkers<LaneNormals>& at);
+
+// The gradients at the ends of each gridline by the shifts of the others, px.
+AtMarkers<LaneEnds> gradients_of(const MarkerOverlaps& overlaps, const AtMarkers<LaneEnds>& shift);
 
 }  // namespace cmp::refine

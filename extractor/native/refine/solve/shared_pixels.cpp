@@ -12,15 +12,14 @@ namespace cmp::refine {
 
 namespace {
 
-// The gridlines at one marker, in their order in MarkerGridlines.
-struct GridlineNumbers {
-  std::array<Index, MARKER_GRIDLINES> at;
-  Index count;
-};
+// Whether gridline e, -1 for none, is drawn and counts.
+bool is_drawn(const GridlineSystem& system, Index e) {
+  return e >= 0 && system.weight[e] * system.lines(e, KNOWN) != 0.0;
+}
 
 // Writes gridline e at marker m into a lane.
 void fill_gridline(Index m, Index e, const GridlineSystem& system, const SharedPixelLimits& limits,
-                   Index lane, LaneGridlines& out) {
+                   std::size_t lane, LaneGridlines& out) {
   const auto lines = system.lines[e], sums = system.sums[e], contrast = system.contrasts[e];
   // the direction in which the curved gridline leaves the marker
   const double sense = system.edges(e, 0) == m ? 1.0 : -1.0;
@@ -38,53 +37,81 @@ void fill_gridline(Index m, Index e, const GridlineSystem& system, const SharedP
   out.red[lane] = part * c0;
   out.green[lane] = part * c1;
   out.blue[lane] = part * c2;
-  out.weight[lane] = system.weight[e];
   out.inverse_length[lane] = 1.0 / lines[LENGTH];
-  out.normal_x[lane] = -lines[UY] / system.variance;
-  out.normal_y[lane] = lines[UX] / system.variance;
 }
 
-// Writes the gridlines at marker m into a lane.
-GridlineNumbers fill_gridlines_at_marker(Index m, const GridlineSystem& system,
-                                         const SharedPixelLimits& limits, Index lane, MarkerGridlines& out) {
-  GridlineNumbers numbers{{}, 0};
-  for (Index k = 0; k < system.spokes.size(1); ++k) {
-    const Index e = system.spokes(m, k);
-    if (e < 0 || system.weight[e] * system.lines(e, KNOWN) == 0.0) continue;
-    fill_gridline(m, e, system, limits, lane, out[numbers.count]);
-    numbers.at[numbers.count++] = e;
+// Calls act(m, e, spoke, lane) for all gridlines that are drawn at the markers of a block of lanes.
+template <class Act>
+void for_gridlines(const GridlineSystem& system, std::size_t block, const Act& act) {
+  const auto spokes = system.spokes;
+  const auto count = static_cast<std::size_t>(spokes.size());
+  for (std::size_t lane = 0; lane < MARKER_LANES && block * MARKER_LANES + lane < count; ++lane) {
+    const auto m = static_cast<Index>(block * MARKER_LANES + lane);
+    for (Index k = 0; k < spokes.size(1); ++k) {
+      if (is_drawn(system, spokes(m, k))) act(m, spokes(m, k), static_cast<std::size_t>(k), lane);
+    }
   }
-  return numbers;
 }
 
 }  // namespace
 
-void add_shared_pixels(const GridlineSystem& system, View<double, 2> diagonal, View<double, 2> off_diagonal,
-                       const SharedPixelLimits& limits) {
-  const Index count = system.spokes.size();
-  MarkerGridlines gridlines;
-  std::array<GridlineNumbers, MARKER_LANES> numbers;
-  for (Index start = 0; start < count; start += MARKER_LANES) {
-    const Index lanes = std::min(MARKER_LANES, count - start);
-    gridlines.fill({});
-    for (Index lane = 0; lane < lanes; ++lane)
-      numbers[lane] = fill_gridlines_at_marker(start + lane, system, limits, lane, gridlines);
-    accumulate_overlaps(gridlines, system.sigma, limits);
-    for (Index lane = 0; lane < lanes; ++lane) {
-      const Index m = start + lane;
-      for (Index i = 0; i < numbers[lane].count; ++i) {
-        const Index e = numbers[lane].at[i], swap = system.edges(e, 0) == m ? 0 : 1;
-        const double nx = -system.lines(e, UY), ny = system.lines(e, UX);
-        const LaneGridlines& own = gridlines[i];
-        diagonal(m, 0) += own.near_x[lane] * nx;
-        diagonal(m, 1) += own.near_x[lane] * ny;
-        diagonal(m, 2) += own.near_y[lane] * ny;
-        off_diagonal(e, 0) += own.far_x[lane] * nx;
-        off_diagonal(e, 1 + swap) += own.far_x[lane] * ny;
-        off_diagonal(e, 2 - swap) += own.far_y[lane] * nx;
-        off_diagonal(e, 3) += own.far_y[lane] * ny;
-      }
-    }
+SharedPixels::SharedPixels(const GridlineSystem& system, const SharedPixelLimits& limits) {
+  const std::size_t blocks =
+      (static_cast<std::size_t>(system.spokes.size()) + MARKER_LANES - 1) / MARKER_LANES;
+  overlaps_.reserve(blocks);
+  AtMarkers<LaneGridlines> at;
+  for (std::size_t block = 0; block < blocks; ++block) {
+    at.fill({});
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      fill_gridline(m, e, system, limits, lane, at[k]);
+    });
+    overlaps_.push_back(overlaps_of(at, system.sigma, limits));
+  }
+}
+
+void SharedPixels::add_information(const GridlineSystem& system, View<double, 2> diagonal,
+                                   View<double, 2> off_diagonal) const {
+  AtMarkers<LaneNormals> at;
+  for (std::size_t block = 0; block < overlaps_.size(); ++block) {
+    at.fill({});
+    for_gridlines(system, block, [&](Index, Index e, std::size_t k, std::size_t lane) {
+      at[k].x[lane] = -system.lines(e, UY);
+      at[k].y[lane] = system.lines(e, UX);
+      at[k].weight[lane] = system.weight[e] / system.variance;
+    });
+    const AtMarkers<LaneInformation> added = information_of(overlaps_[block], at);
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      const LaneInformation& own = added[k];
+      const double nx = at[k].x[lane], ny = at[k].y[lane];
+      const Index swap = system.edges(e, 0) == m ? 0 : 1;
+      diagonal(m, 0) += own.near_x[lane] * nx;
+      diagonal(m, 1) += own.near_x[lane] * ny;
+      diagonal(m, 2) += own.near_y[lane] * ny;
+      off_diagonal(e, 0) += own.far_x[lane] * nx;
+      off_diagonal(e, 1 + swap) += own.far_x[lane] * ny;
+      off_diagonal(e, 2 - swap) += own.far_y[lane] * nx;
+      off_diagonal(e, 3) += own.far_y[lane] * ny;
+    });
+  }
+}
+
+void SharedPixels::explain(const GridlineSystem& system, View<const double, 2> shift,
+                           ShiftGradients& left) const {
+  AtMarkers<LaneEnds> at;
+  for (std::size_t block = 0; block < overlaps_.size(); ++block) {
+    at.fill({});
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      const double nx = -system.lines(e, UY), ny = system.lines(e, UX);
+      const Index far = system.edges(e, system.edges(e, 0) == m ? 1 : 0);
+      at[k].near[lane] = nx * shift(m, 0) + ny * shift(m, 1);
+      at[k].far[lane] = nx * shift(far, 0) + ny * shift(far, 1);
+    });
+    const AtMarkers<LaneEnds> explained = gradients_of(overlaps_[block], at);
+    for_gridlines(system, block, [&](Index m, Index e, std::size_t k, std::size_t lane) {
+      const bool starts = system.edges(e, 0) == m;
+      left.start[e] -= starts ? explained[k].near[lane] : explained[k].far[lane];
+      left.end[e] -= starts ? explained[k].far[lane] : explained[k].near[lane];
+    });
   }
 }
 

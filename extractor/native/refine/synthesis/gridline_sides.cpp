@@ -59,20 +59,7 @@ Array<double, 2> GridlineSides::light(const InkLevels& levels) const {
   const auto out = sides.view();
   const auto cell = levels.cell;
   const auto slope = levels.slope;
-  for (const KnownGridline& line : known_) {
-    for (const auto& [i, side, x, y] : line.neighbours) {
-      if (i < 0) continue;
-      for (Index channel = 0; channel < 3; ++channel) {
-        const double rise = slope(i, channel, 0) * x + slope(i, channel, 1) * y;
-        out(line.edge, side + channel) += cell(i, channel) + rise;
-      }
-    }
-  }
-  add_black(out, levels.black);
-  return sides;
-}
-
-void GridlineSides::add_black(View<double, 2> sides, View<const double, 2> black) const {
+  const auto black = levels.black;
   std::array<std::array<double, 3>, POLYNOMIAL_TERMS> factors;
   for (Index k = 0; k < POLYNOMIAL_TERMS; ++k) factors[k] = {black(0, k), black(1, k), black(2, k)};
   for (const KnownGridline& line : known_) {
@@ -81,12 +68,18 @@ void GridlineSides::add_black(View<double, 2> sides, View<const double, 2> black
       for (std::size_t channel = 0; channel < 3; ++channel)
         level[channel] += line.terms[k] * factors[k][channel];
     }
-    const auto own = sides[line.edge];
-    for (Index channel = 0; channel < 3; ++channel) {
-      own[BEFORE + channel] += level[channel];
-      own[BEYOND + channel] += level[channel];
+    const auto own = out[line.edge];
+    for (Index channel = 0; channel < 3; ++channel)
+      own[BEFORE + channel] = own[BEYOND + channel] = level[channel];
+    for (const auto& [i, side, x, y] : line.neighbours) {
+      if (i < 0) continue;
+      for (Index channel = 0; channel < 3; ++channel) {
+        const double rise = slope(i, channel, 0) * x + slope(i, channel, 1) * y;
+        own[side + channel] += cell(i, channel) + rise;
+      }
     }
   }
+  return sides;
 }
 
 Array<double, 2> value_contrasts(View<const double, 2> sides, View<const float, 1> encoded) {

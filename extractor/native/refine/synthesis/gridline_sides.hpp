@@ -28,9 +28,6 @@ class GridlineSides {
   // the gridline and three beyond; 0 where not known.
   Array<double, 2> light(const InkLevels& levels) const;
 
-  // Adds the black polynomial (3, 10), at the middles of the chords, to both sides (E, 6).
-  void add_black(View<double, 2> sides, View<const double, 2> black) const;
-
  private:
   // A cell beside a gridline.
   struct Neighbour {

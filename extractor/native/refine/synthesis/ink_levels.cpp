@@ -134,30 +134,6 @@ struct LightImages {
   View<const float, 1> drawn;  // empty for none
 };
 
-// Sums of the light of pixels.
-using LightSums = std::array<double, 3>;
-
-// The sums with the light of `count` pixels added, less that of the drawing; `at` is the place of the first
-// one.
-template <bool IS_DRAWN>
-LightSums with_light(LightSums sums, const LightImages& images, Index at, Index count) {
-  const std::uint8_t* const observed = images.observed.data() + at;
-  const float* const light = images.light.data();
-  const float* const drawn = IS_DRAWN ? images.drawn.data() + at : nullptr;
-  auto [s0, s1, s2] = sums;
-  for (Index k = 0; k < 3 * count; k += 3) {
-    s0 += static_cast<double>(light[observed[k]]);
-    s1 += static_cast<double>(light[observed[k + 1]]);
-    s2 += static_cast<double>(light[observed[k + 2]]);
-    if constexpr (IS_DRAWN) {
-      s0 -= static_cast<double>(drawn[k]);
-      s1 -= static_cast<double>(drawn[k + 1]);
-      s2 -= static_cast<double>(drawn[k + 2]);
-    }
-  }
-  return {s0, s1, s2};
-}
-
 // A disc in the image.
 struct Disc {
   double x, y, radius;  // px
@@ -166,22 +142,27 @@ struct Disc {
 // The mean light of the channels in a disc and the number of its pixels; zeros without any.
 template <bool IS_DRAWN>
 std::array<double, 4> disc_mean(const Disc& disc, const LightImages& images, Index height, Index width) {
-  Index count = 0;
-  LightSums sums{};
+  const Index left = std::max<Index>(static_cast<Index>(std::ceil(disc.x - disc.radius)), 0);
+  const Index right = std::min(static_cast<Index>(disc.x + disc.radius), width - 1);
   const Index top = std::max<Index>(static_cast<Index>(std::ceil(disc.y - disc.radius)), 0);
   const Index bottom = std::min(static_cast<Index>(disc.y + disc.radius), height - 1);
+  std::array<double, 4> sums{};
   for (Index y = top; y <= bottom; ++y) {
-    const double dy = static_cast<double>(y) - disc.y;
-    const double half = std::sqrt(std::max(disc.radius * disc.radius - dy * dy, 0.0));
-    const Index first = std::max<Index>(static_cast<Index>(std::ceil(disc.x - half)), 0);
-    const Index last = std::min(static_cast<Index>(disc.x + half), width - 1);
-    const Index pixels = std::max<Index>(last - first + 1, 0);
-    sums = with_light<IS_DRAWN>(sums, images, 3 * (y * width + first), pixels);
-    count += pixels;
+    const double dy = static_cast<double>(y) - disc.y, most = disc.radius * disc.radius - dy * dy;
+    for (Index x = left; x <= right; ++x) {
+      const double dx = static_cast<double>(x) - disc.x;
+      const bool is_inside = dx * dx <= most;  // not a branch, which would be hard to predict
+      const Index at = 3 * (y * width + x);
+      for (Index channel = 0; channel < 3; ++channel) {
+        auto light = static_cast<double>(images.light[images.observed[at + channel]]);
+        if constexpr (IS_DRAWN) light -= static_cast<double>(images.drawn[at + channel]);
+        sums[channel] += is_inside ? light : 0.0;
+      }
+      sums[3] += is_inside ? 1.0 : 0.0;
+    }
   }
-  if (count == 0) return {};
-  const auto pixels = static_cast<double>(count);
-  return {sums[0] / pixels, sums[1] / pixels, sums[2] / pixels, pixels};
+  if (sums[3] == 0.0) return {};
+  return {sums[0] / sums[3], sums[1] / sums[3], sums[2] / sums[3], sums[3]};
 }
 
 }  // namespace

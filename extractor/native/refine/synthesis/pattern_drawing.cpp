@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/processor.hpp"
 #include "refine/synthesis/cell_coverage.hpp"
 #include "refine/synthesis/gridlines.hpp"
 
@@ -79,7 +80,7 @@ class CellDrawing {
     for (PixelRun next{0, top, 0}; next.y <= bottom;) {
       next = fill_runs(next, top, bottom, x0, y0);
       fill_coverage(count_, x0, y0, outline, *pixels_);
-      fill_colors(plane, count_, *pixels_);
+      run_loop<fill_colors>(plane, count_, *pixels_);
       add_colors();
     }
   }

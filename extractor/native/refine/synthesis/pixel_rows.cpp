@@ -13,27 +13,26 @@ void fill_channels(const ComparedImages& images, const RowBlock& block, const Bl
   const std::uint8_t* const image = images.image.data();
   const float* const model = images.model.data();
   const bool is_drawn = images.model.size() > 0;
-  if (!is_drawn) std::fill_n(out.light.begin(), block.pixels(), std::array<float, 3>{});
   for (Index j = 0; j < block.row_length; ++j) {
     const Index own = j * block.lanes(), step = j * block.step;
     for (Index i = 0; i < block.row_count; ++i) {
       const Index at = rows.first[i] + step;
       const std::uint32_t red = image[at], green = image[at + 1], blue = image[at + 2];
       out.observed[own + i] = red | green << 8 | blue << 16;
-      if (is_drawn) out.light[own + i] = {model[at], model[at + 1], model[at + 2]};
+      for (std::size_t channel = 0; channel < 3; ++channel)
+        out.light[channel][own + i] = is_drawn ? model[at + static_cast<Index>(channel)] : 0.0F;
     }
   }
 }
 
 // Fills in the places of the drawn light in the table of values.
 void fill_places(const SideLight& light, const PixelColumn& shares, Index count, Residuals& out) {
-  const auto [step0, step1, step2] = light.step;
-  const auto [beyond0, beyond1, beyond2] = light.beyond;
-  for (Index k = 0; k < count; ++k) {
-    const float h = shares[k];
-    out.place[0][k] = image::table_place(out.light[k][0] + beyond0 + h * step0);
-    out.place[1][k] = image::table_place(out.light[k][1] + beyond1 + h * step1);
-    out.place[2][k] = image::table_place(out.light[k][2] + beyond2 + h * step2);
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    const float step = light.step[channel], beyond = light.beyond[channel];
+    const auto& drawn = out.light[channel];
+    auto& place = out.place[channel];
+#pragma omp simd
+    for (Index k = 0; k < count; ++k) place[k] = image::table_place(drawn[k] + beyond + shares[k] * step);
   }
 }
 
@@ -42,8 +41,8 @@ void fill_drawn(View<const float, 1> encoded, const RowBlock& block, Residuals& 
   const float* const table = encoded.data();
   for (Index j = 0; j < block.row_length; ++j) {
     const Index begin = j * block.lanes(), end = begin + block.row_count;
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      for (Index k = begin; k < end; ++k) {
+    for (Index k = begin; k < end; ++k) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
         const float* const entry = table + out.place[channel][k];
         out.drawn[channel][k] = {entry[0], entry[1]};
       }
@@ -58,8 +57,7 @@ void fill_row_columns(const RowBlock& block, Index first, const RowFrame& frame,
   const double leave = frame.leave, arrive = frame.arrive;
   const double lean = uq / up, per_length = 1.0 / (up * frame.length), bulge = sense * frame.length / up;
   const auto top = static_cast<double>(frame.q_count - block.row_length);
-  const auto count = static_cast<std::int32_t>(block.row_count),
-             lanes = static_cast<std::int32_t>(block.lanes());
+  const auto lanes = static_cast<std::int32_t>(block.lanes());
   const Index step_p = frame.step_p, step_q = frame.step_q;
   for (std::int32_t i = 0; i < lanes; ++i) {
     const double f = static_cast<double>(first) + i - p0;
@@ -75,8 +73,10 @@ void fill_row_columns(const RowBlock& block, Index first, const RowFrame& frame,
     rows.along[i] = static_cast<float>(f * up + g * uq);
     rows.across[i] = static_cast<float>(sense * (g * up - f * uq));
     rows.from[i] = static_cast<float>(start - base);
-    rows.to[i] = i >= count ? -1.0F : static_cast<float>(stop - base);
+    rows.to[i] = static_cast<float>(stop - base);
   }
+  // outside the loop, which the compiler would otherwise split there
+  std::fill(rows.to.begin() + block.row_count, rows.to.begin() + lanes, -1.0F);
 }
 
 }  // namespace
@@ -88,7 +88,7 @@ void fill_rows(const RowBlock& block, Index first, const RowFrame& frame, double
 void fill_values(const ComparedImages& images, const RowBlock& block, const BlockRows& rows,
                  const SideLight& light, const PixelColumn& shares, Residuals& out) {
   fill_channels(images, block, rows, out);
-  fill_places(light, shares, block.pixels(), out);
+  run_loop<fill_places>(light, shares, block.pixels(), out);
   fill_drawn(images.encoded, block, out);
 }
 

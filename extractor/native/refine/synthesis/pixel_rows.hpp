@@ -91,11 +91,11 @@ struct ValueAndSlope {
 struct alignas(64) Residuals {
   // the channels' residuals times their derivatives by the share of the light before the gridline, summed
   PixelColumn projection;
-  PixelColumn information;                        // these derivatives squared, summed
-  std::array<std::array<float, 3>, CHUNK> light;  // the drawn light
-  ChannelPixels<std::int32_t> place;              // of the light in the table of values
-  ChannelPixels<ValueAndSlope> drawn;             // of the light
-  std::array<std::uint32_t, CHUNK> observed;      // values of the image, one channel a byte
+  PixelColumn information;                    // these derivatives squared, summed
+  ChannelPixels<float> light;                 // the drawn light
+  ChannelPixels<std::int32_t> place;          // of the light in the table of values
+  ChannelPixels<ValueAndSlope> drawn;         // of the light
+  std::array<std::uint32_t, CHUNK> observed;  // values of the image, one channel a byte
 
   // The residual of pixel k in a channel.
   float residual(std::size_t channel, Index k) const {

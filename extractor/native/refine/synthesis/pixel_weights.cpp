@@ -48,24 +48,27 @@ void fill_columns(const RowBlock& block, const PixelGeometry& geometry, const We
   const PixelGeometry line = geometry;
   const float reach = weight_reach.reach, end_width = weight_reach.end_width;
   const Index lanes = block.lanes();
-  for (Index j = 0; j < block.row_length; ++j) {
-    const auto step = static_cast<float>(j);
-    const Index at = j * lanes;
-    for (Index i = 0; i < lanes; ++i) {
-      const float along = rows.along[i] + step * line.along_step;
-      const float across = rows.across[i] + step * line.across_step;
-      const bool within = (step >= rows.from[i]) & (step <= rows.to[i]);
-      const float keep = (within & (along >= -reach) & (along <= line.length + reach)) ? 1.0F : 0.0F;
-      const WeightParts parts = weight_parts(along, across, line, end_width);
-      const float ga = keep * parts.density * parts.to_a, gb = keep * parts.density * parts.to_b;
-      const float gc = ga * parts.to_b;
-      out.in_band[at + i] = keep;
-      out.to_a[at + i] = ga;
-      out.to_b[at + i] = gb;
-      out.to_blur[at + i] = parts.z * (ga + gb);
-      out.to_c[at + i] = gc;
-      out.to_d[at + i] = gc * (parts.to_a - parts.to_b);
-      out.before_share[at + i] = half_share(parts.z);
+  for (Index first = 0; first < lanes; first += PIXEL_LANES) {
+    for (Index j = 0; j < block.row_length; ++j) {
+      const auto step = static_cast<float>(j);
+#pragma omp simd
+      for (Index i = first; i < first + PIXEL_LANES; ++i) {
+        const Index at = j * lanes + i;
+        const float along = rows.along[i] + step * line.along_step;
+        const float across = rows.across[i] + step * line.across_step;
+        const bool within = (step >= rows.from[i]) & (step <= rows.to[i]);
+        const float keep = (within & (along >= -reach) & (along <= line.length + reach)) ? 1.0F : 0.0F;
+        const WeightParts parts = weight_parts(along, across, line, end_width);
+        const float ga = keep * parts.density * parts.to_a, gb = keep * parts.density * parts.to_b;
+        const float gc = ga * parts.to_b;
+        out.in_band[at] = keep;
+        out.to_a[at] = ga;
+        out.to_b[at] = gb;
+        out.to_blur[at] = parts.z * (ga + gb);
+        out.to_c[at] = gc;
+        out.to_d[at] = gc * (parts.to_a - parts.to_b);
+        out.before_share[at] = half_share(parts.z);
+      }
     }
   }
 }

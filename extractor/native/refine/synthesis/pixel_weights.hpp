@@ -36,10 +36,7 @@ struct GridlinePixels {
   BlockRows rows;
   PixelWeights weights;
   Residuals residuals;
-  PixelColumn square;  // the residuals squared, summed over the channels
-  // the residuals times the derivatives by the bleed, these times the derivatives by the share of the light
-  // before the gridline, and these squared, each summed over the channels
-  PixelColumn bleed_projection, bleed_cross, bleed_square;
+  PixelColumn blur_cross;  // the products of the derivatives by the share of the light and by the blur
 };
 
 // How far the weights of a gridline reach.

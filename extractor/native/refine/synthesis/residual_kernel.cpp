@@ -30,8 +30,9 @@ class ResidualReader {
     images_ = {view.image.flat().from(start), model.flat().from(start), view.response.encoded};
   }
 
-  // Adds the pixels near gridline e to its sums (24,), and gives these their units.
+  // Fills in the sums (24,) over the pixels near gridline e.
   void read(Index e, View<double, 1> sums) {
+    sums.fill(0.0);
     const SideLight light = side_light(drawn_.sides, drawn_.added, e);
     const auto [c0, c1, c2] = light.contrast;
     if (drawn_.lines(e, KNOWN) == 0.0 || c0 * c0 + c1 * c1 + c2 * c2 == 0.0F) return;
@@ -49,8 +50,7 @@ class ResidualReader {
       fill_rows(block, first, frame, half, pixels_.rows);
       fill_weights(block, line, weights, pixels_);
       fill_values(images_, block, pixels_.rows, light, pixels_.weights.before_share, pixels_.residuals);
-      fill_projections(light, bleed, block.pixels(), pixels_);
-      accumulate_sums(pixels_, block.pixels(), sums);
+      accumulate_sums(light, bleed, block.pixels(), pixels_, sums);
       if (drawn_.is_bending[e]) accumulate_bending_sums(pixels_, block.pixels(), sums);
     }
     update_units(sums, 1.0 / sigma_);
@@ -82,7 +82,7 @@ void fill_zeros(View<float, 3> model, View<const std::int64_t, 1> box) {
 Array<double, 2> accumulate_residual_sums(const image::PyramidLevel& view, View<const float, 3> model,
                                           const DrawnGridlines& drawn, double sigma,
                                           View<const std::int64_t, 1> box, const PixelRowLimits& limits) {
-  Array<double, 2> sums({drawn.lines.size(), SUMS}, 0.0);
+  Array<double, 2> sums({drawn.lines.size(), SUMS});
   ResidualReader reader(view, model, drawn, sigma, box, limits);
   for (Index e = 0; e < drawn.lines.size(); ++e) reader.read(e, sums[e]);
   return sums;
