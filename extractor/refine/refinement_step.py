@@ -11,10 +11,11 @@ from extractor._native import refine as native
 from extractor.layout.topology import Topology
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_bending import LIMITS as BENDING_LIMITS
-from extractor.refine.measure.gridline_bending import BendingLimits, MarkerRows, measure_roughness
+from extractor.refine.measure.gridline_bending import BendingLimits
 from extractor.refine.measure.gridline_weights import LIMITS as WEIGHT_LIMITS
 from extractor.refine.measure.gridline_weights import GridlineWeightLimits
-from extractor.refine.measure.marker_scatter import MarkerScatter, measure_scatter
+from extractor.refine.measure.marker_scatter import LIMITS as SCATTER_LIMITS
+from extractor.refine.measure.marker_scatter import MarkerScatter, ScatterLimits, measure_scatter
 from extractor.refine.solve.disagreement import LIMITS as DISAGREEMENT_LIMITS
 from extractor.refine.solve.disagreement import DisagreementLimits
 from extractor.refine.solve.fisher_information import LIMITS as INFORMATION_LIMITS
@@ -52,6 +53,7 @@ class StepLimits(NamedTuple):
         information: about the markers.
         disagreement: of the gridlines.
         gridlines: of the maps that curve gridlines.
+        scatter: of the markers.
     """
 
     prior_px: float = PRIOR_PX
@@ -60,6 +62,7 @@ class StepLimits(NamedTuple):
     information: InformationLimits = INFORMATION_LIMITS
     disagreement: DisagreementLimits = DISAGREEMENT_LIMITS
     gridlines: GridlineLimits = GRIDLINE_LIMITS
+    scatter: ScatterLimits = SCATTER_LIMITS
 
 
 LIMITS = StepLimits()
@@ -77,6 +80,24 @@ class ExtrapolatedPattern(NamedTuple):
     xy: NDArray[np.float64]
     hidden: NDArray[np.bool_]
     maps: NDArray[np.float64]
+
+
+class MovedPattern(NamedTuple):
+    """The pattern at the markers of a step.
+
+    Attributes:
+        xy, hidden, maps: as in ``ExtrapolatedPattern``.
+        roughness: (M,) px^2. It is the median of the squared third differences along the gridlines at a marker and at
+            its neighbours, less the part that noise and the layout itself explain. With the median, one marker that
+            dirt has moved does not let its gridlines bend.
+        scatter: the fields of ``MarkerScatter``.
+    """
+
+    xy: NDArray[np.float64]
+    hidden: NDArray[np.bool_]
+    maps: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    scatter: tuple[float, float]
 
 
 class StepSolution(NamedTuple):
@@ -99,18 +120,22 @@ def with_pattern_moved(topology: Topology, estimate: Estimate) -> Estimate:
     return estimate._replace(xy=moved.xy, hidden=moved.hidden, maps=moved.maps)
 
 
+def with_pattern_bent(topology: Topology, estimate: Estimate) -> Estimate:
+    """The same with gridlines that may bend by the roughness of the markers, and by their scatter."""
+    moved = MovedPattern(*native.move_pattern(estimate, topology, LIMITS))
+    return estimate._replace(
+        xy=moved.xy,
+        hidden=moved.hidden,
+        maps=moved.maps,
+        roughness=moved.roughness,
+        scatter=MarkerScatter(*moved.scatter),
+    )
+
+
 def scatter_of(topology: Topology, estimate: Estimate) -> MarkerScatter:
     """The scatter of the estimate's markers."""
     markers = estimate.reliable, estimate.maps, estimate.information.diagonal
     return measure_scatter(*markers, topology)
-
-
-def with_bending(topology: Topology, estimate: Estimate, scatter: MarkerScatter) -> Estimate:
-    """The estimate with gridlines that may bend by the roughness of its markers, and by their scatter."""
-    rows = MarkerRows(topology.edges, topology.next_markers, topology.third_differences)
-    markers = estimate.reliable, estimate.maps, estimate.information.diagonal
-    roughness = measure_roughness(*markers, rows, topology.spokes, topology.ring_markers)
-    return estimate._replace(roughness=roughness, scatter=scatter)
 
 
 def gridlines_of(topology: Topology, estimate: Estimate) -> NDArray[np.float64]:

@@ -24,8 +24,7 @@ from extractor.refine.refinement_step import (
     StepLimits,
     StepSolution,
     scatter_of,
-    with_bending,
-    with_pattern_moved,
+    with_pattern_bent,
     with_solution,
 )
 from extractor.refine.solve.convergence import (
@@ -52,8 +51,8 @@ class SynthesisLimits(NamedTuple):
         small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
             follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
             0.15 in the second step. Measured: rule "settled appearance".
-        small_bend: RMS of the gridlines' bending, which the first step does not follow, after which no step may follow, in
-            deviations of a marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
+        small_bend: RMS of the gridlines' bending, which the first step does not follow, after which no step may follow,
+            in deviations of a marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
     """
 
     max_steps: int = 4
@@ -132,7 +131,7 @@ class SynthesisSolver:
         """
         shift = self._no_shift
         for _ in range(LIMITS.max_steps):
-            before = self._drawn(estimate)
+            before = with_pattern_bent(self._topology, estimate)
             estimate, step = self._full_step(view, before)
             share = remaining_share(before.sigma, step.edge_px)
             places = estimate.measured, before.xy, shift
@@ -140,11 +139,6 @@ class SynthesisSolver:
             if remainder < schedule.small_remainder and self._is_settled(before, estimate, step):
                 break
         return estimate._replace(convergence_cov_px2=cov)
-
-    def _drawn(self, estimate: Estimate) -> Estimate:
-        """The estimate with its pattern at the markers of the last step, and with gridlines that may bend."""
-        moved = with_pattern_moved(self._topology, estimate)
-        return with_bending(self._topology, moved, scatter_of(self._topology, moved))
 
     def _is_settled(self, before: Estimate, after: Estimate, step: SynthesisStep) -> bool:
         """Whether the next drawing would differ from the last one by small moves of the markers only.
@@ -154,9 +148,9 @@ class SynthesisSolver:
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
         if change_px >= LIMITS.small_change * before.sigma:
             return False
-        if not before.bend.any():
-            if typical_bending(after.bend, step.is_read, after.information) >= LIMITS.small_bend:
-                return False
+        new_bend = 0.0 if before.bend.any() else typical_bending(after.bend, step.is_read, after.information)
+        if new_bend >= LIMITS.small_bend:
+            return False
         return scatter_of(self._topology, after) == NO_SCATTER
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, SynthesisStep]:

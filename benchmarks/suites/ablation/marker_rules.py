@@ -61,16 +61,16 @@ REFINEMENT = (
         "a step follows while markers scatter",
         "errors and time",
         "extractor/refine/synthesis_steps.py",
-        "or scatter_of(self._topology, after) == NO_SCATTER",
-        "or True",
+        "return scatter_of(self._topology, after) == NO_SCATTER",
+        "return True",
     ),
     Rule(
         "scatter",
         "where markers lie by themselves off the smooth map, gridlines do not curve as its tangents say",
         "errors and time",
-        "extractor/refine/measure/marker_scatter.py",
-        "return MarkerScatter(*found)",
-        "return NO_SCATTER",
+        "extractor/native/refine/measure/marker_scatter.cpp",
+        "if (!(variance > 0.0)) return",
+        "if (true) return",
     ),
 )
 

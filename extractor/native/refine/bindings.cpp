@@ -10,6 +10,7 @@ namespace cmp::refine {
 
 void add_refine(nb::module_ module) {
   bind<&extrapolate_pattern>(module, "extrapolate_pattern", {"xy", "topology", "limits"});
+  bind<&move_pattern>(module, "move_pattern", {"markers", "topology", "limits"});
   bind<&profile_step>(module, "profile_step",
                       {"view", "lines", "across", "state", "topology", "stations", "limits"});
   bind<&synthesis_step>(module, "synthesis_step",

@@ -73,6 +73,17 @@ ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::
   return {std::move(markers.xy), std::move(markers.predicted), std::move(maps)};
 }
 
+MovedPattern move_pattern(const SteppedMarkers& markers, const layout::Topology& topology,
+                          const StepLimits& limits) {
+  const auto known = markers.reliable, diagonal = markers.information.diagonal;
+  auto [xy, hidden, maps] = extrapolate_pattern(known, topology, limits.gridlines);
+  Array<double, 1> roughness = measure_roughness(
+      known, maps, diagonal, {topology.edges, topology.next_markers, topology.third_differences},
+      topology.spokes, topology.ring_markers, limits.bending);
+  const ScatterFigures scatter = measure_scatter(known, maps, diagonal, topology, limits.scatter);
+  return {std::move(xy), std::move(hidden), std::move(maps), std::move(roughness), scatter};
+}
+
 EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradients,
                                      const BendingPrior& prior, View<const double, 2> lines,
                                      View<const std::int32_t, 2> edges, double noise, const MisfitRule& rule,

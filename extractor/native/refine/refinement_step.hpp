@@ -8,6 +8,7 @@
 #include "layout/topology.hpp"
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/measure/gridline_weights.hpp"
+#include "refine/measure/marker_scatter.hpp"
 #include "refine/solve/curved_gridlines.hpp"
 #include "refine/solve/disagreement.hpp"
 #include "refine/solve/fisher_information.hpp"
@@ -34,10 +35,12 @@ struct StepLimits {
   InformationLimits information;
   DisagreementLimits disagreement;
   GridlineLimits gridlines;
+  ScatterLimits scatter;
 
   template <class F>
   static StepLimits read(const F& f) {
-    return {f["prior_px"], f["weights"], f["bending"], f["information"], f["disagreement"], f["gridlines"]};
+    return {f["prior_px"],     f["weights"],   f["bending"], f["information"],
+            f["disagreement"], f["gridlines"], f["scatter"]};
   }
 };
 
@@ -69,6 +72,25 @@ using ExtrapolatedPattern = std::tuple<Array<double, 2>, Array<bool, 1>, Array<d
 // The markers (M, 2) px, NaN where unknown, with those just beyond the known ones.
 ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::Topology& topology,
                                         const GridlineLimits& limits);
+
+// The markers as a step left them.
+struct SteppedMarkers {
+  View<const double, 2> reliable;  // (M, 2) px, NaN where unknown
+  Information information;
+
+  template <class F>
+  static SteppedMarkers read(const F& f) {
+    return {f["reliable"], f["information"]};
+  }
+};
+
+// xy (M, 2), hidden (M,), maps (M, 2, 5), roughness (M,) and the figures of scatter of MovedPattern.
+using MovedPattern =
+    std::tuple<Array<double, 2>, Array<bool, 1>, Array<double, 3>, Array<double, 1>, ScatterFigures>;
+
+// The pattern at the markers that a step left, and how its gridlines may bend.
+MovedPattern move_pattern(const SteppedMarkers& markers, const layout::Topology& topology,
+                          const StepLimits& limits);
 
 // Eliminates the bending of gridlines from the sums (E, 24) and the gradients, once bending is drawn.
 //

@@ -16,10 +16,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from extractor._native import measure as native
 from extractor.refine.synthesis.pixel_rows import LIMITS as PIXEL_LIMITS
 
 
@@ -65,44 +61,3 @@ class BendingLimits(NamedTuple):
 
 
 LIMITS = BendingLimits()
-
-
-class MarkerRows(NamedTuple):
-    """The four markers in a row along each edge.
-
-    Attributes:
-        edges: (E, 2) marker ids of the two in the middle.
-        next_markers: (E, 2) marker ids of the marker before and the marker after, -1 for none.
-        third_differences: (E, 2) the layout's own third difference of the four, in units of its mean edge.
-    """
-
-    edges: NDArray[np.int32]
-    next_markers: NDArray[np.int32]
-    third_differences: NDArray[np.float64]
-
-
-def measure_roughness(
-    xy: NDArray[np.float64],
-    maps: NDArray[np.float64],
-    diagonal: NDArray[np.float64],
-    rows: MarkerRows,
-    spokes: NDArray[np.int32],
-    near: NDArray[np.int32],
-) -> NDArray[np.float64]:
-    """The roughness of the markers.
-
-    The roughness is the median of the squared third differences along the gridlines at a marker and at its neighbours,
-    less the part that noise and the layout itself explain. With the median, one marker that dirt has moved does not let
-    its gridlines bend.
-
-    Args:
-        xy: (M, 2) px, the markers, NaN where unknown.
-        maps: (M, 2, 5), as ``local_maps`` gives them.
-        diagonal: (M, 3) 1/px^2, the information's diagonal blocks.
-        rows: the markers along each edge.
-        spokes, near: (M, 6) and (M, 18), as in ``Topology``.
-
-    Returns:
-        (M,) px^2.
-    """
-    return np.asarray(native.measure_roughness(xy, maps, diagonal, rows, spokes, near, LIMITS))

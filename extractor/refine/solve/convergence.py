@@ -79,9 +79,7 @@ def step_remainder(
     return StepRemainder(*native.step_remainder(*step, information.diagonal, LIMITS))
 
 
-def typical_bending(
-    bend: NDArray[np.float64], is_read: NDArray[np.bool_], information: Information
-) -> float:
+def typical_bending(bend: NDArray[np.float64], is_read: NDArray[np.bool_], information: Information) -> float:
     """The RMS bending of the gridlines that are read, in deviations of a typical marker.
 
     Args:

@@ -1,7 +1,6 @@
 // Room "measure" for Python.
 #include "base/binding.hpp"
 
-#include "refine/measure/gridline_bending.hpp"
 #include "refine/measure/gridline_offsets.hpp"
 #include "refine/measure/gridline_weights.hpp"
 #include "refine/measure/marker_scatter.hpp"
@@ -9,8 +8,6 @@
 namespace cmp::refine {
 
 void add_measure(nb::module_ module) {
-  bind<&measure_roughness>(module, "measure_roughness",
-                           {"xy", "maps", "diagonal", "rows", "spokes", "near", "limits"});
   bind<&measure_scatter>(module, "measure_scatter", {"xy", "maps", "diagonal", "topology", "limits"});
   bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count", "limits"});
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});

@@ -42,11 +42,6 @@ struct MarkerRows {
       next_markers;  // (E, 2) marker ids of the one before and the one after, -1 for none
   View<const double, 2>
       third_differences;  // (E, 2) the layout's own third difference, in units of its mean edge
-
-  template <class F>
-  static MarkerRows read(const F& f) {
-    return {f["edges"], f["next_markers"], f["third_differences"]};
-  }
 };
 
 // The bending as drawn, and what limits it.
