@@ -50,11 +50,19 @@ REFINEMENT = (
     ),
     Rule(
         "bent gridlines",
-        "a step follows one that bent gridlines",
+        "a step follows a first one that found gridlines bent",
         "errors and time",
         "extractor/refine/synthesis_steps.py",
         "small_bend: float = 2.0",
         "small_bend: float = np.inf",
+    ),
+    Rule(
+        "bending is drawn",
+        "markers follow the bending of gridlines once it is drawn",
+        "errors and time",
+        "extractor/native/refine/refinement_step.cpp",
+        "if (has_any(prior.bend)) {",
+        "if (true) {",
     ),
     Rule(
         "scatter is drawn",
