@@ -95,8 +95,8 @@ FinalMarkers accept_markers(const SolvedMarkers& solved, const StartPlaces& plac
   for (Index k = 0; k < variances.size(); ++k) variances[k] += remaining[k];
   if (solved.noise > limits.unexplained_noise_ratio * solved.pixel_noise)
     update_unexplained_markers(xy, cov, places, solved.dot_gain, limits.hidden);
-  Array<bool, 1> unaccepted({xy.size()});
-  for (Index m = 0; m < xy.size(); ++m)
+  Array<bool, 1> unaccepted({every.size()}, false);
+  for (Index m = 0; m < every.size(); ++m)
     unaccepted[m] =
         (std::isnan(xy(m, 0)) || std::isnan(solved.reliable(m, 0))) && std::isfinite(places.xy_px(m, 0));
   const bool all_accepted = std::find(unaccepted.begin(), unaccepted.end(), true) == unaccepted.end();
