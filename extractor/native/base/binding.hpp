@@ -245,10 +245,9 @@ struct FromPython<T> {
     T found = T::read(Fields(object, name, borrowed));
     if constexpr (Lasting<T>) borrowed.note_lasting(before);
     if (PyTuple_Check(object.ptr()) != 0 && borrowed.changeable() == before) {
-      Py_INCREF(object.ptr());
-      Py_XDECREF(last);
-      last = object.ptr();
       record.emplace(found);
+      // given back last, as that may run code that reads a record
+      const nb::object former = nb::steal(std::exchange(last, object.inc_ref().ptr()));
     }
     return found;
   }
