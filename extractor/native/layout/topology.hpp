@@ -5,6 +5,8 @@
 
 namespace cmp::layout {
 
+inline constexpr Index SPOKES = 6;  // edges that end at a marker, at most
+
 // Tables of M markers, E edges, K drawn cells (the colored ones and the white one) and B black cells; -1:
 // none.
 struct Topology {

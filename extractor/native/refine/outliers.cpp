@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "layout/neighbour_tables.hpp"
 #include "numeric/median.hpp"
 #include "refine/measure/gridline_bending.hpp"
 
@@ -13,7 +14,6 @@ namespace {
 using layout::Topology;
 
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-constexpr Index MAX_SPOKES = 6, RING_MARKERS = 18;
 // Share of a third difference that is the error of one of its two inner markers; all of it is, of an outer
 // one.
 constexpr double INNER_MARKER_SHARE = 1.0 / 3.0, OUTER_MARKER_SHARE = 1.0;
@@ -103,7 +103,7 @@ void update_candidates(View<const bool, 1> changed, View<const double, 1> least,
 // Makes the agreed shift of marker m from the third differences (E, 2).
 void update_agreed_shift(Index m, View<const double, 2> differences, const Topology& topology,
                          AgreedShifts& shifts, const OutlierLimits& limits) {
-  std::array<std::array<double, MAX_SPOKES>, 2> single;
+  std::array<std::array<double, layout::SPOKES>, 2> single;
   Index count = 0;
   for (Index k = 0; k < topology.spokes.size(1); ++k) {
     const auto [e, share] = error_share(topology, differences, m, k);
@@ -142,7 +142,7 @@ void update_agreed_shifts(View<const bool, 1> selected, View<const double, 2> di
 
 // px, the median length of the known shifts of the markers `near` (18,); infinite without any.
 double median_shift(View<const double, 1> length, View<const std::int32_t, 1> near) {
-  std::array<double, RING_MARKERS> column;
+  std::array<double, layout::RING_MARKERS> column;
   Index count = 0;
   for (const std::int32_t n : near) {
     if (n >= 0 && std::isfinite(length[n])) column[count++] = length[n];

@@ -130,7 +130,7 @@ WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients
   const Equations equations(system, gradients, curved.hidden, shared, limits);
   Array<double, 2> shift = equations.solved(equations.gradient);
   CurvedGradients bent = curved_gradients(system, gradients, curved, shift, limits.gridlines);
-  shared.explain(system, shift, bent.left);
+  shared.update_explained(system, shift, bent.left);
   Array<double, 1> ratio = variance_ratios(system, bent.left, shift, limits.disagreement);
   Array<double, 1> weight({ratio.size()});
   for (Index e = 0; e < weight.size(); ++e) weight[e] = system.weight[e] / ratio[e];

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "refine/synthesis/residual_kernel.hpp"
+
 namespace cmp::refine {
 
 SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topology& topology,
@@ -15,7 +17,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
   const auto& rule = limits.rule;
   const auto& weights = limits.step.weights;
   Array<bool, 1> is_read({sums.size()});
-  for (Index e = 0; e < is_read.size(); ++e) is_read[e] = sums(e, 0) > 0.0;
+  for (Index e = 0; e < is_read.size(); ++e) is_read[e] = sums(e, AA) > 0.0;
   ShiftGradients gradients = shift_gradients(sums);
   const double blur_px = blur_after_step(sigma, blur_change(sums, state.weight, weights), weights);
   update_for_blur(sums, gradients, blur_px - sigma);

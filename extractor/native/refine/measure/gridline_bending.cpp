@@ -60,7 +60,7 @@ void fill_lane(Index m, Index lane, View<const double, 2> squares, View<const st
   Index missing = 0, row = 0;
   for (Index k = -1; k < FIRST_RING; ++k) {
     const Index n = k < 0 ? m : near(m, k);
-    for (Index i = 0; i < SPOKES; ++i, ++row) {
+    for (Index i = 0; i < layout::SPOKES; ++i, ++row) {
       double square = n >= 0 ? squares(n, i) : NONE;
       if (!(square >= 0.0)) {
         // missing ones lie on both sides of the median, half of them on each

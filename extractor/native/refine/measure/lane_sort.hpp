@@ -5,13 +5,14 @@
 #include <numeric>
 
 #include "base/array.hpp"
+#include "layout/topology.hpp"
 #include "refine/synthesis/gridlines.hpp"
 
 namespace cmp::refine {
 
-inline constexpr Index SPOKES = 6;                             // gridlines at a marker at most
-inline constexpr Index SORT_ROWS = SPOKES * (1 + FIRST_RING);  // gridlines at a marker and at its neighbours
-inline constexpr Index SORT_LANES = 64;                        // columns at once
+// gridlines at a marker and at its neighbours
+inline constexpr Index SORT_ROWS = layout::SPOKES * (1 + FIRST_RING);
+inline constexpr Index SORT_LANES = 64;  // columns at once
 
 // Numbers in rows; each lane is a column.
 class LaneColumn {

@@ -95,8 +95,8 @@ void SharedPixels::add_information(const GridlineSystem& system, View<double, 2>
   }
 }
 
-void SharedPixels::explain(const GridlineSystem& system, View<const double, 2> shift,
-                           ShiftGradients& left) const {
+void SharedPixels::update_explained(const GridlineSystem& system, View<const double, 2> shift,
+                                    ShiftGradients& left) const {
   AtMarkers<LaneEnds> at;
   for (std::size_t block = 0; block < overlaps_.size(); ++block) {
     at.fill({});

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/array.hpp"
+#include "layout/topology.hpp"
 #include "refine/measure/gridline_weights.hpp"
 
 namespace cmp::refine {
@@ -25,8 +26,8 @@ struct SharedPixelLimits {
   }
 };
 
-inline constexpr std::size_t MARKER_LANES = 8;      // markers side by side
-inline constexpr std::size_t MARKER_GRIDLINES = 6;  // at a marker at most
+inline constexpr std::size_t MARKER_LANES = 8;  // markers side by side
+inline constexpr auto MARKER_GRIDLINES = static_cast<std::size_t>(layout::SPOKES);
 inline constexpr std::size_t MARKER_PAIRS = MARKER_GRIDLINES * (MARKER_GRIDLINES - 1) / 2;
 
 using LaneRow = std::array<double, MARKER_LANES>;
@@ -52,7 +53,8 @@ class SharedPixels {
 
   // Removes from the gridlines' gradients what the shifts (M, 2) px of the other gridlines at their ends
   // explain.
-  void explain(const GridlineSystem& system, View<const double, 2> shift, ShiftGradients& left) const;
+  void update_explained(const GridlineSystem& system, View<const double, 2> shift,
+                        ShiftGradients& left) const;
 
  private:
   std::vector<MarkerOverlaps> overlaps_;  // of each `MARKER_LANES` markers
