@@ -1,7 +1,6 @@
 // Hue and chroma of an image, and the hues of its inks under the light of the image.
 #pragma once
 
-#include <array>
 #include <tuple>
 
 #include "base/array.hpp"

@@ -7,7 +7,6 @@
 #include "numbering/outline_fit.hpp"
 #include "numbering/small_pattern.hpp"
 #include "numbering/white_search.hpp"
-#include "numbering/whiteness.hpp"
 
 namespace cmp::numbering {
 

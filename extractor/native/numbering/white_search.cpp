@@ -1,7 +1,6 @@
 #include "numbering/white_search.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "numbering/white_placement.hpp"
 #include "numeric/median.hpp"

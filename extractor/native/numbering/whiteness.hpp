@@ -1,8 +1,6 @@
 // Measures the inks, and the brightness and whiteness of predicted places.
 #pragma once
 
-#include <tuple>
-
 #include "base/array.hpp"
 
 namespace cmp::numbering {

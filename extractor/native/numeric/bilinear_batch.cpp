@@ -1,6 +1,5 @@
 #include "numeric/bilinear_batch.hpp"
 
-#include <bit>
 #include <cstring>
 
 #include "base/processor.hpp"

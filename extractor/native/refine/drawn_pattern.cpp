@@ -1,6 +1,9 @@
 #include "refine/drawn_pattern.hpp"
 
 #include "refine/measure/gridline_bending.hpp"
+#include "refine/synthesis/gridline_sides.hpp"
+#include "refine/synthesis/pattern_drawing.hpp"
+#include "refine/synthesis/residual_kernel.hpp"
 
 namespace cmp::refine {
 

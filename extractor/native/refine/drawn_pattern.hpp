@@ -9,11 +9,9 @@
 #include "refine/estimate.hpp"
 #include "refine/measure/gridline_weights.hpp"
 #include "refine/synthesis/blur_bleed.hpp"
-#include "refine/synthesis/gridline_sides.hpp"
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/ink_levels.hpp"
-#include "refine/synthesis/pattern_drawing.hpp"
-#include "refine/synthesis/residual_kernel.hpp"
+#include "refine/synthesis/pixel_rows.hpp"
 
 namespace cmp::refine {
 

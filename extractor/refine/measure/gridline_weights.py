@@ -66,8 +66,3 @@ def short_edge(xy: NDArray[np.float64], edges: NDArray[np.int32], rarity: int) -
         rarity: at least 1.
     """
     return float(native.short_edge(np.ascontiguousarray(xy), np.ascontiguousarray(edges), rarity))
-
-
-def median_edge(xy: NDArray[np.float64], edges: NDArray[np.int32]) -> float:
-    """The median length, px, of the edges (E, 2) between the markers (M, 2), px; 1 without any."""
-    return float(native.median_edge(np.ascontiguousarray(xy), np.ascontiguousarray(edges), LIMITS))

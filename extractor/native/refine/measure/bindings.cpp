@@ -12,7 +12,6 @@ void add_measure(nb::module_ module) {
   bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count", "limits"});
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
   bind<&short_edge>(module, "short_edge", {"xy", "edges", "rarity"});
-  bind<&median_edge>(module, "median_edge", {"xy", "edges", "limits"});
 }
 
 }  // namespace cmp::refine

@@ -1,8 +1,6 @@
 // Gradients by shifts of the gridlines, the gridlines' weights by their misfit, and the markers after a step.
 #pragma once
 
-#include <tuple>
-
 #include "base/array.hpp"
 
 namespace cmp::refine {

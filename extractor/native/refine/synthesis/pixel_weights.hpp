@@ -2,8 +2,6 @@
 // two ends.
 #pragma once
 
-#include <array>
-
 #include "refine/synthesis/pixel_rows.hpp"
 
 namespace cmp::refine {
