@@ -30,9 +30,9 @@ struct ResponseTables {
 };
 
 // The place of light's value in ResponseTables::encoded; the derivative follows there. Light beyond the table
-// has the first or the last value.
+// has the first or the last value, and NaN, as of an ink without cells, the first.
 inline std::int32_t table_place(float light) {
-  const float root = std::sqrt(std::min(std::max(light, 0.0F), BRIGHTEST));
+  const float root = std::sqrt(std::min(std::max(0.0F, light), BRIGHTEST));
   return 2 * static_cast<std::int32_t>(root * STEPS_PER_ROOT + 0.5F);
 }
 
