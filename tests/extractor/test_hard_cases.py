@@ -128,6 +128,15 @@ def test_saturated_channels_are_read(gain: tuple[float, float, float], limit_px:
     assert sound(markers, seen).all() and rms(markers, seen) < limit_px
 
 
+def test_clipped_cells_are_read_without_an_estimate_of_the_noise() -> None:
+    """Every channel of every cell is 0 or 255, where noise does not show."""
+    seen = render(scene(), size=SIZE)
+    image = np.clip((np.asarray(seen.image, np.float64) - 100) * 8, 0, 255).astype(np.uint8)
+    markers = extractor().extract(image)
+    assert np.isnan(markers.quality.noise)
+    assert sound(markers, seen).all() and rms(markers, seen) < 0.4
+
+
 # -- shapes
 
 

@@ -12,9 +12,9 @@ FirstAppearance initial_appearance(const image::PyramidLevel& view, const layout
   const auto light = view.response.light;
   const auto& disc = limits.levels.disc;
   const View<const float, 3> no_model(nullptr, {0, 0, 3});
-  // the first argument is returned if it is NaN
+  // where all cells are clipped the estimate is NaN, and the first argument is returned
   const double noise =
-      std::max(image::estimate_noise(image, xy, topology.cells, limits.noise), limits.weights.min_noise);
+      std::max(limits.weights.min_noise, image::estimate_noise(image, xy, topology.cells, limits.noise));
   const Array<double, 2> drawn = cell_means(image, light, no_model, xy, topology.cells, sigma, disc);
   const Array<double, 2> black = cell_means(image, light, no_model, xy, topology.black_cells, sigma, disc);
   const InkCells pattern{topology.cells, topology.black_cells, topology.cell_color};
