@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "base/array.hpp"
+#include "image/response.hpp"
 #include "refine/synthesis/gridlines.hpp"
 
 namespace cmp::refine {
@@ -149,7 +150,9 @@ inline SideLight side_light(View<const double, 2> sides, View<const double, 2> a
   const auto side = sides[e], more = added[e];
   for (std::size_t k = 0; k < 3; ++k) {
     const auto channel = static_cast<Index>(k);
-    light.contrast[k] = static_cast<float>(side[channel] - side[channel + 3]);
+    // where levels have gone astray, a contrast that no image has would stand for information
+    const auto contrast = static_cast<float>(side[channel] - side[channel + 3]);
+    light.contrast[k] = std::clamp(contrast, -image::BRIGHTEST, image::BRIGHTEST);
     light.step[k] = static_cast<float>(more[channel] - more[channel + 3]);
     light.beyond[k] = static_cast<float>(more[channel + 3]);
   }
