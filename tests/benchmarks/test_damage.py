@@ -25,6 +25,7 @@ from benchmarks.suites.stress.conditions import BY_NAME
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, plain_frame
 from benchmarks.suites.stress.kinds import make_frame
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
+from extractor import Status
 
 IMAGES, SEED = 42, 60000  # every kind in every pattern, twice
 
@@ -40,6 +41,15 @@ def test_no_marker_is_wrong() -> None:
             kept, sure = kept + result.score.kept, sure + result.score.sure
     assert wrong == []
     assert kept >= 0.97 * sure > 0
+
+
+def test_virtual_markers_state_what_a_bad_drawing_knows() -> None:
+    """On rows of cells two pixels high, with holes, no drawing explains the image; deviations were 1e-5 px."""
+    markers = read_case(parse_case("random cells missing/elliptical/6698"), 1, timing=False)[2]
+    assert markers is not None
+    covariances = markers.virtual_cov_px2[markers.virtual_status == Status.MEASURED]
+    assert len(covariances) > 100
+    assert np.sqrt(np.linalg.eigvalsh(covariances)[:, 0]).min() > 0.01
 
 
 @pytest.mark.parametrize(
