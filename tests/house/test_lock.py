@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tomllib
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[2]
@@ -40,6 +41,18 @@ def test_the_lock_is_what_runs_here() -> None:
         except PackageNotFoundError:
             continue
     assert others == {}, "make setup installs the locked versions; make lock writes the installed ones"
+
+
+def test_the_locked_versions_install_on_debian_12() -> None:
+    refused = {}
+    for name in LOCKED:
+        try:
+            needed = metadata(name)["Requires-Python"]
+        except PackageNotFoundError:
+            continue
+        if needed and not SpecifierSet(needed).contains("3.11.2"):
+            refused[name] = needed
+    assert refused == {}
 
 
 def test_setup_and_ci_use_the_lock() -> None:
