@@ -94,8 +94,8 @@ MovedPattern move_pattern(const SteppedMarkers& markers, const layout::Topology&
 
 // Eliminates the bending of gridlines from the sums (E, 24) and the gradients, once bending is drawn.
 //
-// Before, bending is measured only: the errors of markers look like bending, and markers that would not be
-// held by their gridlines would keep them. // lines (E, 8) and edges (E, 2); noise, gray levels, one channel.
+// Before, bending is only measured: the errors of markers look like bending, and markers whose gridlines gave
+// way would keep these errors. lines (E, 8) and edges (E, 2); noise, gray levels, one channel.
 EliminatedBending update_for_bending(View<double, 2> sums, ShiftGradients& gradients,
                                      const BendingPrior& prior, View<const double, 2> lines,
                                      View<const std::int32_t, 2> edges, double noise, const MisfitRule& rule,
