@@ -14,7 +14,8 @@ from pathlib import Path
 LOCK_PATH = Path(__file__).parents[1] / "requirements.lock"
 HEADER = "# Versions that the tests ran with. Written by: make lock\n"
 # setuptools only builds packages without wheels. The version beside one Python fails on a later Python.
-LEFT_OUT = {"cmpdesign", "pip", "setuptools"}
+# pip and uv only install.
+LEFT_OUT = {"cmpdesign", "pip", "setuptools", "uv"}
 
 
 def lock_text() -> str:
