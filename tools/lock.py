@@ -14,8 +14,7 @@ from pathlib import Path
 LOCK_PATH = Path(__file__).parents[1] / "requirements.lock"
 HEADER = "# Versions that the tests ran with. Written by: make lock\n"
 # setuptools only builds packages without wheels. The version beside one Python fails on a later Python.
-# pip and uv only install.
-LEFT_OUT = {"cmpdesign", "pip", "setuptools", "uv"}
+LEFT_OUT = {"cmpdesign", "pip", "setuptools"}
 
 
 def lock_text() -> str:

@@ -25,6 +25,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
+# Beside .venv, whose packages are those of requirements.lock.
+UV_FOLDER = ROOT / "build" / "uv"
+PIP = (PYTHON, "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check")
 OLDEST = (3, 11)
 # setuptools and wheel: packages without a wheel of their own are built here, too.
 BUILD_NEEDS = ("scikit-build-core", "nanobind", "cmake", "ninja", "setuptools", "wheel")
@@ -101,17 +104,15 @@ class Installer:
             return
         print(f"  {'uv failed' if uv else 'no uv'}: pip installs the packages, some minutes", flush=True)
         self._uv = None
-        pip = (PYTHON, "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check")
-        run(*pip, *self._options, *names)
+        run(*PIP, *self._options, *names)
 
     def _found_uv(self) -> Path | str | None:
         if not self._tried:
             self._tried = True
-            own = VENV / "bin" / "uv"
-            pip = (PYTHON, "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check")
+            own = UV_FOLDER / "bin" / "uv"
             if shutil.which("uv"):
                 self._uv = shutil.which("uv")
-            elif own.exists() or succeeds(*pip, "--only-binary=:all:", "uv"):
+            elif own.exists() or succeeds(*PIP, "--only-binary=:all:", "--target", UV_FOLDER, "uv"):
                 self._uv = own
         return self._uv
 
@@ -131,9 +132,8 @@ def requirements(extra: str = "") -> list[str]:
 def install_editable(zig: bool) -> None:
     """Install this checkout, whose build compiles the native modules in place."""
     toolchain = {"CMAKE_TOOLCHAIN_FILE": str(ROOT / "cmake" / "zig.cmake")} if zig else {}
-    pip = (PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps")
     environment = {**os.environ, **toolchain, "PATH": f"{VENV / 'bin'}{os.pathsep}{os.environ['PATH']}"}
-    run(*pip, "--no-build-isolation", "--editable", ROOT, env=environment)
+    run(*PIP, "--no-deps", "--no-build-isolation", "--editable", ROOT, env=environment)
     # Only the path: the build backend's finder would take the packages from here also in copies of the checkout.
     for path in VENV.glob("lib/*/site-packages/_editable_skbc_cmpdesign.pth"):
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
