@@ -14,8 +14,8 @@ from cmpdesign.api.designs import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.checks import CELL_WARNING_MM, EDGE_WARNING_PX
 from cmpdesign.patterns.graphs import MAX_LAYERS
-from cmpdesign.proposal.predicted_error import Imaging, PredictedError, predict_error
 from cmpdesign.products.registry import USUAL_NAMES, refusal_of
+from cmpdesign.proposal.predicted_error import Imaging, PredictedError, predict_error
 from cmpdesign.units import LENGTHS_MM, parse_length_mm
 
 # Width of the black border: twice the smallest width that `check` accepts, so that the pad need not be centred in the
@@ -59,7 +59,7 @@ class Proposal:
         scale_px_per_mm: pixels in a millimetre, by the tighter of the two sides.
         pitch_px: pixels from marker to marker.
         error: predicted standard deviation per marker and axis, px.
-        limit: limit that a finer pattern would exceed: "pixels", "cells" (that can be made), "layers", "error", or "make".
+        limit: limit that a finer pattern would exceed, of ``Limit``; "cells" that can be made, "make" of the product.
         make: the product that makes the pad; None: not stated.
         refusal: why the product refuses a finer pattern; empty unless ``limit`` is "make".
     """

@@ -43,9 +43,9 @@ def reasons_text(reasons: Mapping[str, int]) -> str:
     from extractor import Reason
 
     codes = set(Reason)
-    return "; ".join(
-        f"{count} x {Reason(reason).text if reason in codes else reason}" for reason, count in reasons.items()
-    )
+    texts = {code.value: code.text for code in codes}
+    texts[Reason.SEVERAL_PADS] += ", or give a rig to `reconstruct`, which reads several views of one pad"
+    return "; ".join(f"{count} x {texts.get(reason, reason)}" for reason, count in reasons.items())
 
 
 def median_quality(qualities: Sequence[Quality]) -> Quality | None:
