@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from extractor.layout.reference import Reference
 
 BLACK, WHITE = 3, 4
+# The cross product of two sides of a cell: that of sides of a nanometre. Smaller ones have too few digits.
+MIN_TURN_MM2 = 1e-12
 # Axial corners of the cells (0, 0).
 UP_CORNERS, DOWN_CORNERS = np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0, 0], [0, 1], [-1, 1]])
 
@@ -89,7 +91,7 @@ def _check_cells(reference: Reference) -> None:
     xy = reference.xy_mm[corners]
     incoming, outgoing = xy - np.roll(xy, 1, axis=1), np.roll(xy, -1, axis=1) - xy
     turn = incoming[..., 0] * outgoing[..., 1] - incoming[..., 1] * outgoing[..., 0]
-    wrong = np.flatnonzero((turn <= 0).any(axis=1))
+    wrong = np.flatnonzero((turn < MIN_TURN_MM2).any(axis=1))
     if len(wrong):
         first = int(wrong[0])
         fail(f"cells.corners[{first}]", str(corners[first].tolist()), "different markers, counter-clockwise")
