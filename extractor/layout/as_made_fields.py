@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout import json_fields as fields
+from extractor.layout.consistency import MAX_CELL_HEIGHT_MM
 from extractor.layout.reference import AsMade
 
 SIDES = ("front", "back")
+OPTIONAL = ("outlines", "covariance_mm2", "cell_height_mm")
 COLUMNS = ("xx", "xy", "yy")  # of a covariance
 
 
@@ -28,7 +30,8 @@ def read_as_made(document: dict[str, Any], markers: int) -> AsMade | None:
     if "as_made" not in document:
         return None
     made = fields.mapping(document["as_made"], "as_made")
-    fields.known_fields(made, ("of", "product", "side"), "as_made.", optional=("outlines", "covariance_mm2"))
+    fields.known_fields(made, ("of", "product", "side"), "as_made.", optional=OPTIONAL)
+    fields.require_version_2(made, ("cell_height_mm",), "as_made.", document["version"])
     of = fields.text_field(made["of"], "as_made.of")
     if not re.fullmatch("[0-9a-f]{64}", of):
         fields.fail("as_made.of", fields.shown(of), "the digest of a layout, 64 hex digits")
@@ -41,7 +44,15 @@ def read_as_made(document: dict[str, Any], markers: int) -> AsMade | None:
         side=side,
         outlines_mm=_outlines_mm(made["outlines"]) if "outlines" in made else None,
         covariance_mm2=_covariance_mm2(made["covariance_mm2"], markers) if "covariance_mm2" in made else None,
+        cell_height_mm=_cell_height_mm(made.get("cell_height_mm", 0.0)),
     )
+
+
+def _cell_height_mm(value: object) -> float:
+    if type(value) not in (int, float) or not abs(value) <= MAX_CELL_HEIGHT_MM:  # type: ignore[arg-type]
+        limit = f"{MAX_CELL_HEIGHT_MM:g}"
+        fields.fail("as_made.cell_height_mm", fields.shown(value), f"a number from -{limit} to {limit} mm")
+    return float(value)  # type: ignore[arg-type]
 
 
 def _outlines_mm(outlines: object) -> tuple[NDArray[np.float64], ...]:

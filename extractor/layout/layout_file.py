@@ -1,4 +1,4 @@
-"""An independent reader of ``layout.json``, version 1.
+"""An independent reader of ``layout.json``, versions 1 and 2.
 
 The file is the only interface to the generator. Every field is checked, then the fields against each other, then the
 digest of the geometry. ``layout.schema.json`` describes the format.
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from extractor.errors import LayoutError
 from extractor.layout import json_fields as fields
-from extractor.layout.arrays import MAX_VIRTUAL_PER_EDGE
 from extractor.layout.as_made_fields import read_as_made
+from extractor.layout.consistency import MAX_VIRTUAL_PER_EDGE
 from extractor.layout.reference import COLORS, Reference
 from extractor.layout.text_file import printable_path, read_text_file
 
@@ -30,6 +30,7 @@ FIELDS = (
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
 OPTIONAL_FIELDS = ("fiducials", "as_made")
+VERSIONS = (1, 2)
 
 
 class HasReference(Protocol):
@@ -139,11 +140,11 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
 
 def _check_header(document: dict[str, Any]) -> None:
     """Check format and version before all other fields, which another version may define differently."""
-    for field, expected in (("format", "cmp-layout"), ("version", 1), ("units", "mm")):
+    for field, expected in (("format", ("cmp-layout",)), ("version", VERSIONS), ("units", ("mm",))):
         value = document.get(field)
-        if type(value) is not type(expected) or value != expected:
+        if type(value) is not type(expected[0]) or value not in expected:
             found = fields.shown(value) if field in document else "missing"
-            fields.fail(field, found, fields.shown(expected))
+            fields.fail(field, found, " or ".join(map(fields.shown, expected)))
     fields.known_fields(document, FIELDS, optional=OPTIONAL_FIELDS)
     fields.text_field(document["generator"], "generator")
 

@@ -1,4 +1,4 @@
-"""The reader's value of a layout: a pattern as ``layout.json``, version 1, describes it."""
+"""The reader's value of a layout: a pattern as ``layout.json`` describes it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.frozen_record import FrozenRecord
-from extractor.layout.arrays import check_arrays
 from extractor.layout.consistency import check_consistency
 
 COLORS = ("red", "green", "blue", "black", "white")
@@ -34,6 +33,8 @@ class AsMade(FrozenRecord):
         outlines_mm: one (K, 2) float64 outline for each cell that is not black; None: triangles between the markers.
         covariance_mm2: (M, 2, 2) float64, of the places of the layout's markers, NaN for a marker that was not
             measured and stays at its nominal place; None: unknown.
+        cell_height_mm: height of the cells over the black, which holds the markers, towards the camera; negative:
+            recessed cells; 0: flat.
     """
 
     of: str
@@ -41,6 +42,7 @@ class AsMade(FrozenRecord):
     side: str
     outlines_mm: tuple[NDArray[np.float64], ...] | None = None
     covariance_mm2: NDArray[np.float64] | None = None
+    cell_height_mm: float = 0.0
 
     def __post_init__(self) -> None:
         if self.covariance_mm2 is not None:
@@ -101,7 +103,6 @@ class Reference(FrozenRecord):
         return f"<Reference {self.pattern}: {self.layers} layers, {len(self.layer)} markers{made}>"
 
     def __post_init__(self) -> None:
-        check_arrays(self)
         check_consistency(self)
         for name in ARRAY_FIELDS:
             getattr(self, name).setflags(write=False)
