@@ -32,7 +32,7 @@ OLDEST = (3, 11)
 # setuptools and wheel: packages without a wheel of their own are built here, too.
 BUILD_NEEDS = ("scikit-build-core", "nanobind", "cmake", "ninja", "setuptools", "wheel")
 # Of an older .venv: two distributions of OpenCV in one environment overwrite each other.
-REPLACED = "opencv-contrib-python-headless"
+REPLACED = "opencv-python-headless"
 
 
 class SetUpError(Exception):
