@@ -77,7 +77,7 @@ docs: $(READY)
 lock: $(READY) $(CORE)
 	@$(BIN)/python -m tools.lock
 
-wheel: $(BASE)
+wheel: $(READY)
 	@$(BIN)/python -m tools.wheel
 
 test-sanitized: $(READY)

@@ -29,10 +29,12 @@ PYTHON = VENV / "bin" / "python"
 UV_FOLDER = ROOT / "build" / "uv"
 PIP = (PYTHON, "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check")
 OLDEST = (3, 11)
-# setuptools and wheel: packages without a wheel of their own are built here, too.
-BUILD_NEEDS = ("scikit-build-core", "nanobind", "cmake", "ninja", "setuptools", "wheel")
-# Of an older .venv: two distributions of OpenCV in one environment overwrite each other.
-REPLACED = "opencv-python-headless"
+BUILD_NEEDS = ("scikit-build-core", "nanobind", "cmake", "ninja")
+# For libraries of [dev] without a wheel of their own.
+SOURCE_NEEDS = ("setuptools", "wheel")
+# setuptools comes with the environment of Python 3.11. The other one comes from an older .venv: two distributions of
+# OpenCV in one environment overwrite each other.
+NOT_NEEDED = ("setuptools", "opencv-python-headless")
 
 
 class SetUpError(Exception):
@@ -49,6 +51,7 @@ def main() -> int:
     install = Installer([f"--constraint={given.lock}"] if given.lock else [])
     try:
         if given.part == "dev":
+            install.packages(*SOURCE_NEEDS)
             step("libraries for tests and documentation", install.packages, *requirements("dev"))
         else:
             make_base(install, given.zig)
@@ -64,8 +67,7 @@ def make_base(install: Installer, zig: bool) -> None:
     print("Setting up .venv (once)", flush=True)
     step("environment", run, sys.executable, "-m", "venv", VENV)
     step("build tools", install.packages, *BUILD_NEEDS, *(["ziglang"] if zig else []))
-    if any(VENV.glob(f"lib/*/site-packages/{REPLACED.replace('-', '_')}-*")):
-        run(PYTHON, "-m", "pip", "uninstall", "--quiet", "--yes", REPLACED)
+    succeeds(PYTHON, "-m", "pip", "uninstall", "--yes", *NOT_NEEDED)
     step("libraries", install.packages, *requirements())
     step("native modules, compiled", install_editable, zig)
 

@@ -108,6 +108,31 @@ class KerfDocument(Document):
     patches: tuple[PatchPart, ...]
 
 
+class GridFieldPart(Part):
+    """One power and speed of a grid."""
+
+    name: str
+    power_percent: float
+    speed_mm_s: float
+    windows: dict[int, Literal["through", "marked", "unmarked"]] = Field(
+        description="Passes -> what is seen."
+    )
+    passes: int | None = Field(description="Fewest passes that cut through; null: none.")
+    least_depth_per_pass_mm: float | None = Field(description="Thickness over these passes.")
+    most_depth_per_pass_mm: float | None = Field(description="Null: the first window is open already.")
+
+
+class GridDocument(Document):
+    """What ``kerf`` read in the picture of a grid."""
+
+    format: Literal["cmp-grid"] = "cmp-grid"
+    version: Literal[1] = 1
+    scale_px_mm: float = Field(description="Scale, px per mm.")
+    from_back: bool = Field(description="The picture shows the sheet's back.")
+    best: str | None = Field(description="The quickest field that cuts through with a pass in reserve.")
+    fields: tuple[GridFieldPart, ...]
+
+
 class CalibratePatternDocument(Document):
     """The result of ``calibrate pattern``."""
 

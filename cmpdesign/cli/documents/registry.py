@@ -27,7 +27,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "reconstruct": (runs.ReconstructDocument, runs.RecoverDocument),
     "dataset": (data.DatasetDocument,),
     "extract": (data.DatasetDocument,),
-    "kerf": (reading.KerfDocument,),
+    "kerf": (reading.KerfDocument, reading.GridDocument),
     "calibrate pattern": (reading.CalibratePatternDocument,),
     "export lerobot": (runs.ExportDocument,),
     "export zarr": (runs.ExportDocument,),

@@ -68,10 +68,12 @@ class _Style:
 
     def __init__(self) -> None:
         with extra("print"):
+            from reportlab import platypus
             from reportlab.lib.colors import HexColor
             from reportlab.lib.styles import ParagraphStyle
+            from reportlab.lib.units import mm
 
-        self._color = HexColor
+        self._color, self._flow, self._mm = HexColor, platypus, mm
         base = {"textColor": HexColor(_INK), "fontName": "Helvetica"}
         self._text = ParagraphStyle("text", fontSize=10, leading=13.5, spaceAfter=4, **base)
         self._cell = ParagraphStyle("cell", fontSize=9, leading=11, **base)
@@ -102,8 +104,7 @@ class _Style:
 
     def check_list(self, texts: tuple[str, ...]) -> Any:
         """Texts with an empty box before each."""
-        from reportlab.lib.units import mm
-
+        mm = self._mm
         line = [("BOX", (0, 0), (0, 0), 0.8, self._color(_INK))]
         rows = [[self._grid([[""]], [4 * mm], line, [4 * mm]), self.text(text)] for text in texts]
         return self._grid(rows, [9 * mm, 164 * mm], [])
@@ -115,12 +116,8 @@ class _Style:
         return self._grid(rows, None, [])
 
     def _paragraph(self, text: str, style: Any, marked_up: bool = False) -> Any:
-        from reportlab.platypus import Paragraph
-
-        return Paragraph(text if marked_up else escape(text), style)
+        return self._flow.Paragraph(text if marked_up else escape(text), style)
 
     def _grid(self, rows: list[Any], widths: Any, lines: list[Any], heights: Any = None) -> Any:
-        from reportlab.platypus import Table as Grid
-
         style = [("VALIGN", (0, 0), (-1, -1), "TOP"), *lines]
-        return Grid(rows, widths, heights, style=style, hAlign="LEFT", spaceAfter=6)
+        return self._flow.Table(rows, widths, heights, style=style, hAlign="LEFT", spaceAfter=6)

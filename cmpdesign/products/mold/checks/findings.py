@@ -272,7 +272,7 @@ def _shape_findings(stack: MoldStack) -> Iterator[Finding]:
     option = stack.options
     if stack.crown is not None and stack.layout.cell_corners.shape[1] != 3:
         remedy = "choose a triangular pattern, or make the pad flat"
-        subject = "cells with four corners on a crown, which lie in no plane"
+        subject = "corners of a cell on a crown (four are in no plane)"
         yield Finding(subject, 4, 3, "", remedy, "error", is_measure=False)
     wall = moat_to_pin_mm(stack)
     if wall < LEAST_WALL_MM:
