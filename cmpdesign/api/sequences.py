@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from cmpdesign.api.layouts import reference_from
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import CmpDesignError, OutputError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.live.options import Live, LiveKind
 from cmpdesign.tracking.recording.options import DEFAULT_FRAME_ID, Recording
+from cmpdesign.tracking.shape_options import ShapeOptions as ShapeOptions
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from extractor.pipeline import Side
     from extractor.presets import Preset
 
-Watch = Callable[[Any], None]
 AnySource = str | Path | int | Sequence[str | Path]
 
 
@@ -101,11 +101,12 @@ class Reading:
     @property
     def viewer(self) -> Live | None:
         """The live server's options."""
-        if self.live is None:
-            if self.live_port is not None or self.live_wait_s:
-                raise CmpDesignError("--live-port and --live-wait need --live")
-            return None
-        return Live(self.live, self.live_port, self.live_wait_s)
+        if self.live is not None:
+            return Live(self.live, self.live_port, self.live_wait_s)
+        if self.live_port is not None or self.live_wait_s:
+            port, wait, needed = map(parameter, ("live_port", "live_wait_s", "live"))
+            raise CmpDesignError(f"{port} and {wait} need {needed}")
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +137,7 @@ def track(
     mm_per_px: float | None = None,
     overlay: str | Path | None = None,
     quiver: str | Path | None = None,
-    watch: Watch = lambda frame: None,
+    watch: Callable[[Any], None] = lambda frame: None,
     **reading: Unpack[ReadingOptions],
 ) -> Followed:
     """Follow a pattern through a video, a folder or a camera into a table, as the command ``track`` does.
@@ -182,7 +183,7 @@ def reconstruct(
     source: str | Path | int | Sequence[str | Path | int],
     output: str | Path,
     *,
-    watch: Watch = lambda frame: None,
+    watch: Callable[[Any], None] = lambda frame: None,
     shape: ShapeOptions | None = None,
     **reading: Unpack[ReadingOptions],
 ) -> Followed:
@@ -250,32 +251,6 @@ def load_run(path: str | Path) -> Run:
     from cmpdesign.tracking.export.runs import read_run
 
     return read_run(Path(path))
-
-
-@dataclass(frozen=True)
-class ShapeOptions:
-    """Options of ``reconstruct`` that concern the surface.
-
-    Attributes:
-        from_rest: place all views by the rest frame, also the views whose pose the rig gives.
-        flatness_mm: standard deviation of the markers from the plane at rest.
-        model_px: error of the camera model; None: from the rest frame.
-        surface: also give the touched surface, by the [elastomer] of the rig.
-
-    Raises:
-        CmpDesignError: a length that is negative or not finite.
-    """
-
-    from_rest: bool = False
-    flatness_mm: float = 0.0
-    model_px: float | None = None
-    surface: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("flatness_mm", "model_px"):
-            value = getattr(self, name)
-            if value is not None and not 0 <= value < float("inf"):
-                raise CmpDesignError(f"{name} is {value:g}; expected a number from 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -445,7 +420,7 @@ class ReconstructJob:
 Job = TrackJob | ReconstructJob
 
 
-def follow(job: Job, watch: Watch) -> Followed:
+def follow(job: Job, watch: Callable[[Any], None]) -> Followed:
     """Follow a source to its end and write the summary; after a failure the summary covers the frames so far.
 
     Raises:
@@ -497,7 +472,7 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 
 def _require_positive(name: str, value: float | None) -> None:
     if value is not None and not 0 < value < float("inf"):
-        raise CmpDesignError(f"{name} is {value:g}; expected a number above 0")
+        raise CmpDesignError(f"{parameter(name)} is {value:g}; expected a number above 0")
 
 
 def _texts(source: AnySource) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.errors import CmpDesignError, InputError, parameter
 from cmpdesign.files.image_header import is_raw_of_camera, pictures_in_file, size_in_header
 from cmpdesign.inputs.file_kinds import HEAD_BYTES, RAW, describe_file, is_raw_picture
 from cmpdesign.inputs.files import MOST_PIXELS, open_file, read_file
@@ -103,7 +103,7 @@ def decode_bytes(data: bytes, path: str | Path, most_pixels: int = MOST_PIXELS) 
     if size[0] * size[1] > most_pixels:
         raise ImageFileError(
             f"{path}: is {size[0]} x {size[1]} px, {size[0] * size[1] / 1e6:.4g} megapixels; the limit is "
-            f"{most_pixels / 1e6:.4g}; make it smaller, or raise the limit where the command has --max-pixels"
+            f"{most_pixels / 1e6:.4g}; make it smaller, or raise {parameter('max_pixels')}"
         )
     if data.startswith(b"\x89PNG") and size[0] * size[1] > PNG_PIXELS_PER_BYTE * len(data):
         raise ImageFileError(

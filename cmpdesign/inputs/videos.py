@@ -19,6 +19,7 @@ from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
+from cmpdesign.errors import parameter
 from cmpdesign.inputs.file_kinds import describe_file
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.inputs.sources import SourceError
@@ -126,7 +127,7 @@ def _prepare(container: Any, name: str, most_pixels: int) -> None:
     if context.width * context.height > most_pixels:
         raise SourceError(
             f"{name}: the frames have {context.width} x {context.height} px; the limit is "
-            f"{most_pixels / 1e6:.4g} megapixels (--max-pixels)"
+            f"{most_pixels / 1e6:.4g} megapixels ({parameter('max_pixels')})"
         )
     context.thread_count = 1
     context.copy_opaque = True

@@ -9,6 +9,7 @@ from benchmarks.ablation import report as ablation
 from benchmarks.acceptance import report as acceptance
 from benchmarks.camera import page as camera
 from benchmarks.datasets import run as datasets
+from benchmarks.photoreal import page as photoreal
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.pooled import PooledResult
 from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture, pooled_markdown
@@ -69,6 +70,7 @@ def pages() -> dict[Path, str]:
         | extraction.markdown(read_measured("extraction"))
         | datasets.markdown(read_measured("datasets"))
         | camera.documentation_blocks(read_measured("camera"))
+        | photoreal.documentation_blocks(read_measured("photoreal"))
         | ablation.documentation_blocks(read_measured(ablation.NAME))
         | acceptance.documentation_blocks(read_measured(acceptance.NAME))
     )

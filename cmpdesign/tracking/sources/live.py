@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
+from cmpdesign.errors import parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.inputs.sources import SourceError, without_password
 from cmpdesign.inputs.videos import decoded_frames, opened_stream, packets_of
@@ -160,7 +161,7 @@ def _require_frame_size(capture: Any, name: str, most_pixels: int) -> None:
     if width * height > most_pixels:
         raise SourceError(
             f"{name}: the frames have {width} x {height} px; the limit is {most_pixels / 1e6:.4g} megapixels "
-            "(--max-pixels)"
+            f"({parameter('max_pixels')})"
         )
 
 

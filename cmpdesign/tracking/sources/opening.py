@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from cmpdesign.errors import parameter
 from cmpdesign.files.images import is_image_file
 from cmpdesign.inputs.files import MOST_PIXELS, path_exists
 from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind, name_sources
@@ -59,7 +60,9 @@ def open_named(
     """
     wanted = _wanted_times(times)
     if source.address and wanted is not None:
-        raise SourceError(f"{source.name}: --times is for files; a camera and a stream have their own times")
+        raise SourceError(
+            f"{source.name}: {parameter('times')} is for files; a camera and a stream have their own times"
+        )
     match source.kind:
         case SourceKind.STREAM:
             return StreamSource(source.address, most_pixels)
@@ -93,5 +96,7 @@ def _wanted_times(text: str | None) -> str | TimeTable | None:
     if text is None or text in ("names", "index"):
         return text
     if Path(text).suffix.lower() != ".csv":
-        raise SourceError(f"--times {text}: expected names, index or a file .csv of FRAME,SECONDS")
+        raise SourceError(
+            f"{parameter('times', text)}: expected names, index or a file .csv of FRAME,SECONDS"
+        )
     return read_time_table(Path(text))

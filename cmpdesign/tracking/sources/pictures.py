@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
+from cmpdesign.errors import parameter
 from cmpdesign.files.images import ImageFileError, read_image
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.inputs.frame_names import NS_PER_S, NamedTimes, read_names
@@ -78,9 +79,9 @@ def _times(
     if named is None and wanted == "names":
         raise SourceError(
             f"{name}: the names carry no times; expected one number that rises from name to name, as in frame7.png or "
-            "1700000000.123.png; use --times index, or --times FILE.csv"
+            f"1700000000.123.png; use {parameter('times', 'index')}, or {parameter('times')} with a file .csv"
         )
-    rate = f"{fps:g} per second ({'--fps' if is_given else 'the default; --fps'})"
+    rate = f"{fps:g} per second ({parameter('fps') if is_given else 'the default of ' + parameter('fps')})"
     if named is None:
         text = f"times: counted at {rate}, by the order of {len(paths)} pictures"
         return [index / fps for index in range(len(paths))], SourceTimes("index", text)

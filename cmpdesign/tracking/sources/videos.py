@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from cmpdesign.errors import parameter
 from cmpdesign.files.images import is_image_file
 from cmpdesign.inputs.files import MOST_PIXELS, is_regular_file, path_exists
 from cmpdesign.inputs.sources import SourceError
@@ -50,7 +51,7 @@ class VideoSource:
     ) -> None:
         if times == "names":
             raise SourceError(
-                f"{paths[0]}: a video has no names of frames; use --times index, or --times FILE.csv"
+                f"{paths[0]}: a video has no names of frames; use {parameter('times', 'index')}, or a file .csv"
             )
         self._paths, self._most_pixels = tuple(paths), most_pixels
         facts, bare = [], False
@@ -65,7 +66,9 @@ class VideoSource:
         self._table = times if isinstance(times, TimeTable) else None
         self._is_counted = fps is not None or times == "index"
         if times == "index" and self.fps is None:
-            raise SourceError(f"{self.name}: --times index needs --fps, because the file states no rate")
+            raise SourceError(
+                f"{self.name}: {parameter('times', 'index')} needs {parameter('fps')}, because the file states no rate"
+            )
         self.times = self._describe_times(facts[0].began_unix_s, bare, fps is not None)
 
     def _describe_times(self, began_s: float | None, is_bare_stream: bool, is_given: bool) -> SourceTimes:
@@ -73,10 +76,11 @@ class VideoSource:
         if self._table is not None:
             return table_times(self._table)
         if self._is_counted:
-            text = f"times: counted at {self.fps:g} per second ({'--fps' if is_given else 'the rate of the file'})"
+            rate_of = parameter("fps") if is_given else "the rate of the file"
+            text = f"times: counted at {self.fps:g} per second ({rate_of})"
             return SourceTimes("index", text, began_s, began_of)
         if is_bare_stream:
-            text = "no times: a stream without a container has none; give the rate with --fps"
+            text = f"no times: a stream without a container has none; give the rate with {parameter('fps')}"
             return SourceTimes("none", text, is_doubtful=True)
         parts = f", {len(self._paths)} parts one after another" if len(self._paths) > 1 else ""
         return SourceTimes("video", f"times: those of the video{parts}", began_s, began_of)
