@@ -342,4 +342,4 @@ def test_exposure_haze_and_white_balance(change: Callable[[Any], Any]) -> None:
 def test_an_unknown_preset_names_the_others() -> None:
     """There was a preset "fast"."""
     with pytest.raises(ValueError, match="preset is 'fast'; give one of balanced, accurate"):
-        Extractor(small_layout("honeycomb", 3), preset="fast")  # type: ignore[arg-type]
+        Extractor(parse_layout(small_text("honeycomb", 3)), preset="fast")  # type: ignore[arg-type]
