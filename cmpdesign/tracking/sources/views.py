@@ -44,7 +44,7 @@ class _View:
 
 
 class MultiViewSource:
-    """Sources that run at the same time, one for each view; all end with the shortest.
+    """Sources that run at the same time, one for each view; live ones end with the first that stops.
 
     Frames belong together if their times differ by at most half the shortest time from frame to frame. A frame without
     a partner is kept, with the reason in ``problem``. Sources without times are joined by number.
@@ -90,7 +90,9 @@ class MultiViewSource:
         """Frames of all sources, with the first source's times; a missing image is None in the list."""
         views = [_View(source) for source in self._sources]
         self._align(views)
-        while all(view.head is not None for view in views):
+        ends_together, tail = all if self.is_live else any, 0
+        shorter: list[str] = []
+        while ends_together(view.head is not None for view in views):
             chosen = self._chosen(views)
             time_s = next(view.time_s for view, is_in in zip(views, chosen, strict=True) if is_in)
             problems, images = [], []
@@ -103,11 +105,16 @@ class MultiViewSource:
                 elif frame.problem:
                     problems.append(frame.problem)
             self._alone += not all(chosen)
+            tail += any(view.head is None for view in views)
+            shorter = shorter or [view.source.name for view in views if view.head is None]
             yield SourceFrame(time_s, images, "; ".join(problems))
             for view, is_in in zip(views, chosen, strict=True):
                 if is_in:
                     view.advance()
-        self.ended_early = self._early_end(views)
+        reasons = [source.ended_early for source in self._sources if source.ended_early]
+        if tail > 1 and not reasons:
+            reasons = [f"{' and '.join(shorter)} has fewer frames than the others"]
+        self.ended_early = "; ".join(reasons)
 
     def _align(self, views: Sequence[_View]) -> None:
         """Put the sources on one clock, if they have one: that of their names, or of this computer."""
@@ -119,18 +126,16 @@ class MultiViewSource:
 
     def _chosen(self, views: Sequence[_View]) -> list[bool]:
         """The views whose next frames belong together: the earliest one, and those within half a step of it."""
-        times_s = [view.time_s for view in views]
+        here = [view.head is not None for view in views]
+        times_s = [
+            view.time_s if is_here else float("inf") for view, is_here in zip(views, here, strict=True)
+        ]
         if self._by_number or any(time_s != time_s for time_s in times_s):
-            return [True] * len(views)
+            return here
         steps_s = [view.step_s for view in views if view.step_s > 0]
         self._within_s = 0.5 * min(steps_s) if steps_s else float("inf")
         first_s = min(times_s)
-        return [time_s - first_s <= self._within_s for time_s in times_s]
-
-    def _early_end(self, views: Sequence[_View]) -> str:
-        reasons = [source.ended_early for source in self._sources if source.ended_early]
-        going_on = any(view.head is not None for view in views)
-        if going_on and not reasons:
-            shorter = [view.source.name for view in views if view.head is None]
-            reasons = [f"{' and '.join(shorter)} has fewer frames than the others"]
-        return "; ".join(reasons)
+        return [
+            is_here and time_s - first_s <= self._within_s
+            for time_s, is_here in zip(times_s, here, strict=True)
+        ]

@@ -19,8 +19,8 @@ from cmpdesign.files.images import read_image
 from cmpdesign.inputs.sources import name_sources
 from cmpdesign.tracking.sources import SourceError, open_named, open_source, open_sources
 from tests.support.command import refused, run
-from tests.support.tracking.files import loaded, write_moving_pattern
 from tests.support.made.videos import cut_jpeg, cut_without_encoding, turn_in_player, write_video
+from tests.support.tracking.files import loaded, write_moving_pattern
 
 COUNT = 14
 
