@@ -42,7 +42,7 @@ class ReliefLimits(NamedTuple):
     rounds: int = 2
     grid: int = 15
     grid_reach: float = 3.0
-    correlated: float = 4.0
+    correlated: float = 8.0
     min_gridlines: int = 30
 
 
