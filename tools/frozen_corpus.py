@@ -45,7 +45,7 @@ TEMPLATES = ("digit", "elliptical", "gelsight-mini", "honeycomb", "round", "squa
 PRODUCTS = "svg,layout,preview,laser,print,report"
 SOLIDS = ("digit", "round", "tac3d")  # molds and meshes of one crown, one round and one plain pad
 PATTERNS = ("honeycomb", "round", "elliptical")
-PRESETS = ("fast", "balanced", "accurate")
+PRESETS = ("balanced", "accurate")
 
 
 def digest(value: Any) -> str:
