@@ -174,7 +174,7 @@ def _uncompensated_findings(job: LaserJob) -> Iterator[Finding]:
         names = " and ".join(f"laser.{name}" for name in idle)
         remedy = "leave them out: without compensation (laser.kerf_mm = 0) paths are the outlines"
         yield Finding(
-            f"options without effect: {names}", len(idle), 0, "", remedy, "warning", is_measure=False
+            "options without effect", len(idle), 0, "", remedy, "warning", is_measure=False
         )
 
 
