@@ -172,10 +172,8 @@ def _uncompensated_findings(job: LaserJob) -> Iterator[Finding]:
     idle = sorted({"corner", "face", "taper_deg"} & options.model_fields_set)
     if idle:
         names = " and ".join(f"laser.{name}" for name in idle)
-        remedy = "leave them out: without compensation (laser.kerf_mm = 0) paths are the outlines"
-        yield Finding(
-            "options without effect", len(idle), 0, "", remedy, "warning", is_measure=False
-        )
+        remedy = f"leave {names} out: without compensation (laser.kerf_mm = 0) paths are the outlines"
+        yield Finding("options without effect", len(idle), 0, "", remedy, "warning", is_measure=False)
 
 
 def _spacing_findings(job: LaserJob) -> Iterator[Finding]:
