@@ -55,8 +55,8 @@ def build(
     """
     from dataclasses import asdict
 
-    from cmpdesign.cli.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
+    from cmpdesign.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.layout.build import build_layout
     from cmpdesign.products.building import build_files
     from cmpdesign.watch import watched

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -36,6 +37,8 @@ PresetOption = Annotated[
 ]
 
 FramesOption = Annotated[int | None, typer.Option("--frames", min=1, help="Stop after this many frames.")]
+
+LayoutArgument = Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")]
 
 SourcesArgument = Annotated[
     list[str],
