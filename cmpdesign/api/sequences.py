@@ -145,7 +145,9 @@ def reconstruct_job(
     return ReconstructJob(pattern, Path(rig), _list_text(rest), _list_text(source), Path(output), chosen)
 
 
-def open_source(source: AnySource, fps: float | None = None, max_pixels: int = MOST_PIXELS) -> FrameSource:
+def open_source(
+    source: AnySource, fps: float | None = None, max_pixels: int = MOST_PIXELS, times: str | None = None
+) -> FrameSource:
     """Open a source of frames.
 
     >>> tracker = extractor.Tracker("layout.json")
@@ -157,13 +159,14 @@ def open_source(source: AnySource, fps: float | None = None, max_pixels: int = M
             number, a stream ("rtsp://..."), or a sequence of pictures, folders and patterns.
         fps: frames per second of a folder (default 30), or instead of a video's own rate.
         max_pixels: largest frame that is read, width x height.
+        times: see ``SequenceOptions``.
 
     Raises:
         SourceError: the source cannot be opened.
     """
     from cmpdesign.tracking import sources
 
-    return sources.open_source(_texts(source), fps, max_pixels)
+    return sources.open_source(_texts(source), fps, max_pixels, times)
 
 
 def load_run(path: str | Path) -> Run:

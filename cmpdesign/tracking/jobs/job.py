@@ -110,11 +110,13 @@ class TrackJob:
         if rest is not None:
             at_rest = read_rest_markers(str(rest), source, how["fps"], new_tracker(), how["max_pixels"])
         tracker = new_tracker(rest=at_rest, mm_per_px=how["mm_per_px"])
-        frames = open_source(source, how["fps"], how["max_pixels"])
+        frames = open_source(source, how["fps"], how["max_pixels"], how["times"])
         video = None
         if self.overlay is not None:
             video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
-        outputs = open_outputs(self.output, TrackTable(tracker), recording_of(how), viewer)
+        outputs = open_outputs(
+            self.output, TrackTable(tracker, lambda: frames.times), recording_of(how), viewer
+        )
         statistics = TrackStatistics(self.layout)
         return TrackingRun(frames, tracker, outputs.sink, statistics, video, how["frames"], live=outputs.live)
 
@@ -183,10 +185,12 @@ class ReconstructJob:
             model_px=how["model_px"],
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
-        source = open_sources(self.source, how["fps"], how["max_pixels"])
+        source = open_sources(self.source, how["fps"], how["max_pixels"], how["times"])
         is_one_a_view = len(split_list(self.source)) > 1
         recording = replace(recording_of(how), views=rig.views, is_image_one_a_view=is_one_a_view)
-        outputs = open_outputs(self.output, ShapeTable(reconstructor, continuation), recording, viewer)
+        outputs = open_outputs(
+            self.output, ShapeTable(reconstructor, continuation, lambda: source.times), recording, viewer
+        )
         tracker = ShapeTracker(
             reconstructor,
             warm=not how["cold"],
@@ -269,6 +273,7 @@ def write_summary(run: TrackingRun, job: Job[Summary]) -> Summary:
     if not run.statistics.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     summary = job.summary(run)
+    summary["times"] = run.source.times.to_json()
     if run.live is not None:
         summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
     # Tables of several formats in one folder have a summary each.

@@ -16,6 +16,8 @@ class SequenceOptions(TypedDict, total=False):
 
     Keys:
         fps: frames per second; None: a video's own; 30 for a folder.
+        times: times of the frames: names (their numbers), index (the count), or a .csv of FRAME,SECONDS; None: what the
+            names say; a video's own.
         frames: stop after this many frames.
         cold: number every frame without the previous frame: slower.
         preset: speed or accuracy of the positions; the ids are the same.
@@ -31,6 +33,7 @@ class SequenceOptions(TypedDict, total=False):
     """
 
     fps: Annotated[float | None, Usual(None, above=0)]
+    times: Annotated[str | None, Usual(None, metavar="names|index|FILE")]
     frames: Annotated[int | None, Usual(None, least=1)]
     cold: Annotated[bool, Usual(False)]
     preset: Annotated[Preset, Usual("balanced")]
