@@ -133,11 +133,32 @@ def _check_reference_cell(reference: Reference, triangular: bool) -> None:
         fail("reference.marker", str(marker), f"a corner of the reference cell {cell}")
     if not triangular:
         return
-    white = np.flatnonzero(reference.cell_color == WHITE).tolist()
-    if white != [cell]:
-        fail("reference.cell", str(cell), f"the only white cell; white are {white[:5]}")
+    white = np.flatnonzero(reference.cell_color == WHITE)
+    if reference.code is not None:
+        _check_code(reference, white)
+    elif white.tolist() != [cell]:
+        fail("reference.cell", str(cell), f"the only white cell; white are {white[:5].tolist()}")
     if marker != 0:
         fail("reference.marker", str(marker), "0, where the numbering of layers starts")
+
+
+def _check_code(reference: Reference, white: NDArray[np.int_]) -> None:
+    """Check that the white cells of a coded pad are several, with the reference cell, and none in an ink's place."""
+    if reference.reference_cell not in white or len(white) < 2:
+        fail(
+            "reference.cell",
+            str(reference.reference_cell),
+            f"one of several white cells of a code; white are {white[:5].tolist()}",
+        )
+    axial = axial_coordinates(reference.layer, reference.index)
+    # The corners of an up-cell (q, r), which has an ink, add up to (3q + 1, 3r + 1).
+    wrong = white[(axial[reference.cell_corners[white]].sum(axis=1) % 3 == 1).all(axis=1)]
+    if len(wrong):
+        fail(
+            f"cells.color[{wrong[0]}]",
+            "white",
+            "the ink of its place; a code has white cells instead of black ones",
+        )
 
 
 def _check_colors(reference: Reference) -> None:
