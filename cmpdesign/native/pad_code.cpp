@@ -11,8 +11,10 @@ namespace cmp {
 namespace {
 
 using Windows = View<const std::int32_t, 2>;
+using Rows = View<const std::int32_t, 1>;
 
 constexpr Index WORD_BITS = 64;
+constexpr Index NONE = -1;
 
 // Numbers of the generator SplitMix64 (Steele et al., OOPSLA 2014): integers, the same on every machine.
 class Numbers {
@@ -69,16 +71,14 @@ class Search {
     return windows_(w, numbers.below(windows_.size(1)));
   }
 
-  // Exchanges the colors of two cells unless the penalty grows; true if they are exchanged.
-  bool exchange(Index first, Index second) {
+  // Exchanges the colors of two cells unless the penalty grows.
+  void exchange(Index first, Index second) {
     for (const Index cell : {first, second})
       for (const Use use : uses_[cell]) touch(use.window);
     const std::int64_t before = penalty_;
     change_touched(first, second);
-    const bool is_kept = penalty_ <= before;
-    if (!is_kept) change_touched(first, second);
+    if (penalty_ > before) change_touched(first, second);
     clear_touched();
-    return is_kept;
   }
 
  private:
@@ -132,35 +132,58 @@ class Search {
   std::int64_t penalty_ = 0;
 };
 
+// The cells of each ring but the fixed one; the first ones of a ring are white.
+class Rings {
+ public:
+  Rings(Rows ring, Rows whites, Index fixed, Numbers& numbers)
+      : members_(static_cast<std::size_t>(whites.size())) {
+    for (Index cell = 0; cell < ring.size(); ++cell)
+      if (cell != fixed) members_[ring[cell]].push_back(cell);
+    for (std::vector<Index>& members : members_)
+      for (std::size_t i = members.size(); i > 1; --i) std::swap(members[i - 1], members[numbers.below(i)]);
+  }
+
+  const std::vector<Index>& members(Index ring) const { return members_[ring]; }
+
+ private:
+  std::vector<std::vector<Index>> members_;
+};
+
+// A cell of the other color in the same ring, drawn evenly; NONE if there is none.
+Index partner(Index cell, const std::vector<Index>& members, const Array<std::uint8_t, 1>& is_white,
+              Numbers& numbers) {
+  Index others = 0;
+  for (const Index member : members) others += is_white[member] != is_white[cell];
+  if (others == 0) return NONE;
+  Index left = numbers.below(others);
+  for (const Index member : members)
+    if (is_white[member] != is_white[cell] && left-- == 0) return member;
+  return NONE;
+}
+
 // (C,) 1 for the white ones of C black cells: such that any two windows differ in at least `wanted` cells; all 0
 // if no such choice is found within `steps` exchanges.
 //
-// windows (W, K): the cells of every window, in the order of their places. fixed: a cell that is white always.
-// whites: number of white cells, 2 to C - 1.
-Array<std::uint8_t, 1> white_cells(Windows windows, Index cells, Index fixed, Index whites, Index wanted,
+// windows (W, K): the cells of every window, in the order of their places. ring (C,): the ring of each cell.
+// whites (R,): number of white cells of each ring besides `fixed`, a cell that is white always.
+Array<std::uint8_t, 1> white_cells(Windows windows, Rows ring, Rows whites, Index fixed, Index wanted,
                                    Index steps, Index seed) {
-  Search search(windows, cells, wanted);
+  Search search(windows, ring.size(), wanted);
   Numbers numbers(static_cast<std::uint64_t>(seed));
-  Array<Index, 1> order({cells}), place({cells});  // the white cells first, of them `fixed` first
-  std::iota(order.begin(), order.end(), Index{0});
-  std::swap(order[0], order[fixed]);
-  for (Index i = 1; i < cells; ++i) std::swap(order[i], order[i + numbers.below(cells - i)]);
-  for (Index i = 0; i < cells; ++i) place[order[i]] = i;
-  for (Index i = 0; i < whites; ++i) search.flip(order[i]);
+  const Rings rings(ring, whites, fixed, numbers);
+  search.flip(fixed);
+  for (Index k = 0; k < whites.size(); ++k)
+    for (Index i = 0; i < whites[k]; ++i) search.flip(rings.members(k)[i]);
   search.add_all_penalties();
   for (Index step = 0; step < steps && search.penalty() > 0; ++step) {
     const Index first = search.cell_to_change(numbers);
     if (first == fixed) continue;
-    const Index i = place[first];
-    const Index j = i < whites ? whites + numbers.below(cells - whites) : 1 + numbers.below(whites - 1);
-    const Index second = order[j];
-    if (!search.exchange(first, second)) continue;
-    std::swap(order[i], order[j]);
-    std::swap(place[first], place[second]);
+    const Index second = partner(first, rings.members(ring[first]), search.is_white(), numbers);
+    if (second != NONE) search.exchange(first, second);
   }
-  Array<std::uint8_t, 1> found({cells}, 0);
+  Array<std::uint8_t, 1> found({ring.size()}, 0);
   if (search.penalty() == 0)
-    for (Index i = 0; i < cells; ++i) found[i] = search.is_white()[i];
+    for (Index i = 0; i < ring.size(); ++i) found[i] = search.is_white()[i];
   return found;
 }
 
@@ -168,7 +191,7 @@ Array<std::uint8_t, 1> white_cells(Windows windows, Index cells, Index fixed, In
 
 void add_pad_code(nb::module_ module) {
   bind<&white_cells>(module, "white_cells",
-                     {"windows", "cells", "fixed", "whites", "wanted", "steps", "seed"});
+                     {"windows", "ring", "whites", "fixed", "wanted", "steps", "seed"});
 }
 
 }  // namespace cmp

@@ -26,7 +26,7 @@ from cmpdesign.patterns.numbering import Ints, axial_from_layer
 MAX_CODE = 255  # a page of the documentation lists the number of codes of each number of layers
 DEFAULT_SHARE, MIN_SHARE, MAX_SHARE = 0.12, 0.1, 0.4
 # The layers up to which windows of a radius are told apart; the search succeeds for every code with the default share.
-RADIUS_UP_TO_LAYERS = {10: 4, 16: 5, 24: 6}
+RADIUS_UP_TO_LAYERS = {6: 4, 10: 5, 16: 6, 24: 7}
 MIN_LAYERS, MAX_LAYERS = 4, max(RADIUS_UP_TO_LAYERS)
 # A reader accepts a place if the second best place explains this many cells less.
 LEAD_BITS, LEAD_SHARE = 3, 0.1
@@ -34,14 +34,12 @@ LEAD_BITS, LEAD_SHARE = 3, 0.1
 PAD_DISTANCE = 1 / 8
 MOST_STEPS = 4000
 # With so few cells, only these codes keep PAD_DISTANCE.
-ROOM_OF_LAYERS = {4: 20, 5: 22, 6: 32}
+ROOM_OF_LAYERS = {4: 7, 5: 21, 6: 36}
 # The searches of these codes, by layers, start from other numbers: with 0, two pads are nearer than PAD_DISTANCE, or
 # the search fails. A test computes all pads of all layers.
 SALTS = {
-    7: {124: 1, 153: 1, 185: 1, 189: 2, 201: 1, 206: 1, 217: 1, 226: 1, 230: 1, 248: 1},
-    8: {182: 1},
-    9: {24: 1, 74: 1, 143: 1, 148: 1, 194: 1, 199: 1, 223: 1, 255: 1},
-    10: {72: 1, 186: 1, 226: 1},
+    7: {79: 1, 94: 1, 100: 1, 106: 1, 140: 1, 188: 1, 208: 1, 237: 1, 239: 1, 242: 1, 253: 1},
+    10: {184: 1, 192: 1, 247: 1},
 }
 
 
@@ -145,8 +143,8 @@ def coded_graph(graph: MarkerGraph, code: PadCode) -> MarkerGraph:
     is_white = white_cells(layers, code)
     if not is_white.any():
         raise DesignError(
-            f"code_share = {code.share:g} is too low for {layers} layers: no "
-            f"{white_count(layers, code.share)} white cells make every window of the radius {window_radius(layers)} differ in "
+            f"code_share = {code.share:g} is too low for {layers} layers: {white_count(layers, code.share)} white cells "
+            f"do not make all windows of the radius {window_radius(layers)} differ in "
             f"{window_distance(window_radius(layers))} cells; make it {DEFAULT_SHARE:g} or higher"
         )
     color = graph.color.copy()
@@ -176,10 +174,16 @@ def down_cells(layers: int) -> Ints:
     """(C, 2) the axial (q, r) of the cells that can be black, in ascending order."""
     span = np.arange(-layers, layers + 1)
     q, r = (grid.ravel() for grid in np.meshgrid(span, span, indexing="ij"))
+    cells = np.stack([q, r], axis=1)
+    return cells[cell_rings(cells) <= layers]
+
+
+def cell_rings(cells: Ints) -> NDArray[np.int32]:
+    """(N,) the outermost layer of the corners of the down-cells (q, r)."""
+    q, r = cells[:, 0], cells[:, 1]
     corner_q, corner_r = np.stack([q, q, q - 1]), np.stack([r, r + 1, r + 1])
     layer = np.maximum(np.maximum(np.abs(corner_q), np.abs(corner_r)), np.abs(corner_q + corner_r))
-    within: NDArray[np.bool_] = (layer <= layers).all(axis=0)
-    return np.stack([q, r], axis=1)[within].astype(np.int64)
+    return layer.max(axis=0).astype(np.int32)
 
 
 def code_windows(layers: int, radius: int) -> NDArray[np.int32]:
@@ -207,21 +211,31 @@ def turn_down_cells(cells: Ints) -> Ints:
     return np.stack([-cells.sum(axis=1), cells[:, 0] - 1], axis=1)
 
 
-@cache
 def white_cells(layers: int, code: PadCode) -> NDArray[np.bool_]:
     """(C,) the white cells of ``down_cells``; none if the search fails."""
+    salt = SALTS.get(layers, {}).get(code.id, 0)
+    return searched_cells(layers, white_count(layers, code.share), code.id, salt)
+
+
+@cache
+def searched_cells(layers: int, whites: int, code: int, salt: int) -> NDArray[np.bool_]:
+    """(C,) as ``white_cells``, of a search from another start for each ``salt``."""
     from cmpdesign._native import pad_code as native
 
-    cells, radius, whites = down_cells(layers), window_radius(layers), white_count(layers, code.share)
-    salt = SALTS.get(layers, {}).get(code.id, 0)
+    cells, radius = down_cells(layers), window_radius(layers)
+    ring = cell_rings(cells)
+    fixed = int(np.flatnonzero((cells == 0).all(axis=1))[0])
+    # Ring k completes 3 k^2 cells. Without a number for every ring, the search would leave none for the rim.
+    up_to_ring = np.maximum((2 * whites * np.arange(layers + 1) ** 2 + layers**2) // (2 * layers**2), 1)
+    of_ring = np.diff(up_to_ring, prepend=1).astype(np.int32)
     found = native.white_cells(
         code_windows(layers, radius),
-        len(cells),
-        int(np.flatnonzero((cells == 0).all(axis=1))[0]),
-        whites,
+        ring,
+        of_ring,
+        fixed,
         window_distance(radius),
         MOST_STEPS,
-        ((1000 * salt + whites) * (MAX_LAYERS + 1) + layers) * (MAX_CODE + 1) + code.id,
+        ((1000 * salt + whites) * (MAX_LAYERS + 1) + layers) * (MAX_CODE + 1) + code,
     )
     is_white = np.asarray(found, dtype=np.bool_)
     is_white.setflags(write=False)
