@@ -140,12 +140,11 @@ def coded_graph(graph: MarkerGraph, code: PadCode) -> MarkerGraph:
     layers = int(graph.layer[-1])
     _require_room(layers, code.id)
     cells = np.flatnonzero((graph.color == BLACK) | (graph.color == WHITE))
-    is_white = white_cells(layers, code)
+    is_white, radius = white_cells(layers, code), window_radius(layers)
     if not is_white.any():
         raise DesignError(
-            f"code_share = {code.share:g} is too low for {layers} layers: {white_count(layers, code.share)} white cells "
-            f"do not make all windows of the radius {window_radius(layers)} differ in "
-            f"{window_distance(window_radius(layers))} cells; make it {DEFAULT_SHARE:g} or higher"
+            f"code_share = {code.share:g} is too low for {layers} layers: {white_count(layers, code.share)} white cells do "
+            f"not make all windows of the radius {radius} differ in {window_distance(radius)} cells; make it {DEFAULT_SHARE:g} or higher"
         )
     color = graph.color.copy()
     color[cells] = np.where(is_white[_cell_numbers(graph, cells)], WHITE, BLACK)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.frozen_record import FrozenRecord
+from extractor.layout.consistency import check_consistency
 
 COLORS = ("red", "green", "blue", "black", "white")
 RED, GREEN, BLUE, BLACK, WHITE = range(5)
@@ -65,7 +66,8 @@ class PadCode:
 class Reference(FrozenRecord):
     """A pattern as the layout file describes it, in read-only arrays and mappings.
 
-    Layout frame: mm, origin at marker 0, x right, y up, seen from the front.
+    Layout frame: mm, origin at marker 0, x right, y up, seen from the front. A ``Reference`` is checked when the value
+    is made, also by ``dataclasses.replace``: all code that takes one, native code included, relies on this check.
 
     Attributes:
         pattern: the pattern's name.
@@ -86,6 +88,9 @@ class Reference(FrozenRecord):
         fiducial_diameter_mm: diameter of these marks.
         code: the pad's code; None: the reference cell alone is white.
         as_made: differences of a made pad from its design; None for a pad as designed.
+
+    Raises:
+        LayoutError: an array of another dtype or shape, an index out of range, or fields that contradict each other.
     """
 
     pattern: str
@@ -113,6 +118,7 @@ class Reference(FrozenRecord):
         return f"<Reference {self.pattern}: {self.layers} layers, {len(self.layer)} markers{made}>"
 
     def __post_init__(self) -> None:
+        check_consistency(self)
         for name in ARRAY_FIELDS:
             getattr(self, name).setflags(write=False)
         self._freeze_mappings("parameters", "palette")
