@@ -143,8 +143,9 @@ def coded_graph(graph: MarkerGraph, code: PadCode) -> MarkerGraph:
     is_white, radius = white_cells(layers, code), window_radius(layers)
     if not is_white.any():
         raise DesignError(
-            f"code_share = {code.share:g} is too low for {layers} layers: {white_count(layers, code.share)} white cells do "
-            f"not make all windows of the radius {radius} differ in {window_distance(radius)} cells; make it {DEFAULT_SHARE:g} or higher"
+            f"code_share = {code.share:g} is too low for {layers} layers: {white_count(layers, code.share)} white "
+            f"cells do not make all windows of the radius {radius} differ in {window_distance(radius)} cells; "
+            f"make it {DEFAULT_SHARE:g} or higher"
         )
     color = graph.color.copy()
     color[cells] = np.where(is_white[_cell_numbers(graph, cells)], WHITE, BLACK)
@@ -182,7 +183,7 @@ def cell_rings(cells: Ints) -> NDArray[np.int32]:
     q, r = cells[:, 0], cells[:, 1]
     corner_q, corner_r = np.stack([q, q, q - 1]), np.stack([r, r + 1, r + 1])
     layer = np.maximum(np.maximum(np.abs(corner_q), np.abs(corner_r)), np.abs(corner_q + corner_r))
-    return layer.max(axis=0).astype(np.int32)
+    return np.asarray(layer.max(axis=0), dtype=np.int32)
 
 
 def code_windows(layers: int, radius: int) -> NDArray[np.int32]:
