@@ -52,7 +52,7 @@ def kerf(
 ) -> None:
     """Measure the kerf on a cut coupon, or read a grid of settings, and print the lines for the material's file."""
     from cmpdesign.api import workshop
-    from cmpdesign.cli.documents.reading import KerfDocument
+    from cmpdesign.documents.reading import KerfDocument
     from cmpdesign.products.laser.coupon.design import load_coupon
 
     cut_coupon = load_coupon(coupon)
@@ -80,7 +80,7 @@ def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
     """Print a grid's table, and the lines for the material's file; end the command."""
     from rich.table import Table
 
-    from cmpdesign.cli.documents.reading import GridDocument
+    from cmpdesign.documents.reading import GridDocument
 
     table = Table(box=None, pad_edge=False)
     counts = sorted({passes for one in reading.fields for passes in one.states})

@@ -40,7 +40,7 @@ def size(
     ] = None,
 ) -> None:
     """Propose pitch and layers for a camera and its field of view, with the markers' predicted error."""
-    from cmpdesign.cli.documents.designs import SizeDocument
+    from cmpdesign.documents.designs import SizeDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.proposal import camera_design
 
@@ -56,7 +56,7 @@ def size(
     say(table)
     if output is not None:
         say(f"wrote {printable_path(output)}")
-        say_text(f"next: {proposal.next_command(shlex.quote(str(output)))}")
+        say_text(f"next: {proposal.next_command(shlex.quote(str(output)))}\n")
     else:
-        say_text("\n" + proposal.to_toml() + "\n# next: the same with -o sized.toml")
+        say_text("\n" + proposal.to_toml() + "\n# next: the same with -o sized.toml\n")
     finish(lambda: SizeDocument.model_validate(proposal.to_json()))
