@@ -25,9 +25,8 @@ def directions(most: float, count: int = 400) -> np.ndarray:
 def opencv_places(lens: Lens, direction: np.ndarray) -> np.ndarray:
     points = np.column_stack([direction, np.ones(len(direction))])[:, None]
     project = cv2.fisheye.projectPoints if lens.kind == "fisheye" else cv2.projectPoints
-    if lens.kind == "fisheye":
-        return project(points, np.zeros((3, 1)), np.zeros((3, 1)), np.eye(3), np.array(lens.coefficients))[0][:, 0]
-    return project(points, np.zeros(3), np.zeros(3), np.eye(3), np.array(lens.coefficients))[0][:, 0]
+    still = np.zeros((3, 1))
+    return project(points, still, still, np.eye(3), np.array(lens.coefficients))[0][:, 0]
 
 
 @pytest.mark.parametrize("lens", LENSES, ids=lambda lens: f"{lens.kind}{len(lens.coefficients)}")
