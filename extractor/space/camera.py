@@ -40,12 +40,14 @@ class Linearisation(NamedTuple):
 
     Attributes:
         xy_px: (N, 2) float64, in the frame of the full image.
+        directions: (N, 2) float64, X / Z and Y / Z in which the camera sees the points.
         by_point: (N, 2, 3) float64, px/mm, by the point in the layout frame.
         by_pose: (N, 2, 6) float64, by the pose: a turn (rad) of the pattern about the layout's origin along the
             camera's axes, then a shift (mm) along these axes.
     """
 
     xy_px: Array
+    directions: Array
     by_point: Array
     by_pose: Array
 
@@ -190,6 +192,14 @@ class View:
         """(N, 2) px of points (N, 3) mm in the layout frame; NaN behind the camera and beyond the fold radius."""
         return self.linearised(xyz_mm).xy_px
 
+    def by_lens(self, directions: Array) -> Array:
+        """(N, 2, 4 + K) derivatives of the pictures of directions (N, 2) by fx, fy, cx, cy and the coefficients."""
+        columns = np.zeros((len(directions), 2, 4 + len(self.distortion)))
+        columns[:, [0, 1], [0, 1]] = self._lens.distort(directions).xy
+        columns[:, [0, 1], [2, 3]] = 1
+        columns[:, :, 4:] = np.array(self.focal_px)[:, None] * self._lens.by_coefficients(directions)
+        return columns
+
     def linearised(self, xyz_mm: Array) -> Linearisation:
         """The projections of points (N, 3) mm in the layout frame, and their derivatives by point and pose."""
         rotated = xyz_mm @ self.R_camera_from_layout.T
@@ -209,9 +219,9 @@ class View:
         xy_px = distorted.xy * self.focal_px + self.centre_px
         if seen is not None:
             by_point = by_camera @ seen.by_point @ self.R_camera_from_layout
-            return Linearisation(xy_px, by_point, by_camera @ seen.by_pose)
+            return Linearisation(xy_px, normalised, by_point, by_camera @ seen.by_pose)
         by_pose = np.concatenate([by_camera @ -cross_matrix(rotated), by_camera], axis=2)
-        return Linearisation(xy_px, by_camera @ self.R_camera_from_layout, by_pose)
+        return Linearisation(xy_px, normalised, by_camera @ self.R_camera_from_layout, by_pose)
 
     def normalised(self, xy_px: Array) -> Array:
         """(N, 2) undistorted X / Z, Y / Z of pixels (N, 2); NaN where the distortion has no inverse."""

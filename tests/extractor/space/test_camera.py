@@ -50,7 +50,7 @@ def test_projection_is_opencvs(mirrored: bool, back: bool) -> None:
 def test_derivatives_are_those_of_the_projection() -> None:
     view = looking("one", tilt_deg=25, azimuth_deg=40, roll_deg=20, mirrored=True)
     xyz = pressed(reference().xy_mm)
-    _, by_point, by_pose = view.linearised(xyz)
+    _, _, by_point, by_pose = view.linearised(xyz)
     step = 1e-5
     for k in range(3):
         moved = step * np.eye(3)[k]
