@@ -1,7 +1,7 @@
 """Bundle adjustment of one camera over many pictures of a sheet: Levenberg-Marquardt on blocks.
 
-The unknowns are the camera's parameters and the sheet's shape, common to all pictures, and one pose a picture. The poses
-are eliminated picture by picture (Schur's complement), so that the system to solve has the size of the common part.
+The unknowns are the camera's parameters and the sheet's shape, common to all pictures, and one pose a picture. The
+poses are eliminated picture by picture (Schur's complement), so that the system to solve has the size of the common part.
 Every picture has its own scale of errors, estimated from its residuals, so that a picture that contradicts weighs
 little; points beyond ``HUBER`` deviations weigh less (Huber 1964).
 """
@@ -66,11 +66,6 @@ class Problem:
     model: CameraModel
     bent: bool
     size_px: tuple[int, int]
-
-    @property
-    def stated(self) -> bool:
-        """Whether the points' deviations are stated."""
-        return all(one.cov_px2 is not None for one in self.sightings)
 
     @cached_property
     def counts(self) -> Array:
@@ -224,7 +219,9 @@ def _minimise(problem: Problem, current: Guess, scales: Array, prior: _Prior) ->
 
 def _cost(problem: Problem, guess: Guess, scales: Array, prior: _Prior) -> float:
     offset = guess.common - prior.values
-    return float(_squares(residuals(problem, guess) / scales[:, None, None]).sum() + prior.information @ offset**2)
+    return float(
+        _squares(residuals(problem, guess) / scales[:, None, None]).sum() + prior.information @ offset**2
+    )
 
 
 def _squares(residual: Array) -> Array:
@@ -247,7 +244,9 @@ def _step(blocks: Blocks, prior: _Prior, values: Array, damping: float) -> tuple
     root = np.sqrt(system.diagonal())
     step = np.linalg.solve(system / root / root[:, None], right / root) / root
     left = blocks.right_pose - np.einsum("vgp,g->vp", blocks.mixed, step)
-    gain = float(right @ step) + float(np.einsum("vp,vpq,vq->", blocks.right_pose, inverse, blocks.right_pose))
+    gain = float(right @ step) + float(
+        np.einsum("vp,vpq,vq->", blocks.right_pose, inverse, blocks.right_pose)
+    )
     return step, np.einsum("vpq,vq->vp", inverse, left), gain
 
 
@@ -338,7 +337,6 @@ def _scales(problem: Problem, residual: Array, scales: Array) -> tuple[Array, fl
     for _ in range(10):  # to the scales at which Huber's cost is as expected
         found = found * np.sqrt(np.maximum(_squares(residual / found[:, None, None]) / freedom, 0.01))
     base = float(np.median(found))
-    base = max(base, 1.0) if problem.stated else base
     return np.maximum(found, base), base
 
 

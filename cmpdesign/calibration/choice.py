@@ -2,8 +2,8 @@
 
 The adjustment without picture v differs from the whole one by the step (S - S_v)^-1 b_v in the common unknowns, for
 their information S, the picture's part S_v and its part b_v of the gradient; the picture's squares then change by
-2 b_v' step + step' S_v step. So leaving out each picture in turn costs no further adjustment. Models are compared by the
-likelihood of the pictures left out, each with a scale of its own, so that a picture that contradicts decides nothing.
+2 b_v' step + step' S_v step. So leaving out each picture in turn costs no further adjustment. Models are compared by
+the likelihood of the pictures left out, each with a scale of its own, so that a picture that contradicts decides nothing.
 """
 
 from __future__ import annotations
@@ -35,10 +35,7 @@ def left_out_scales(adjusted: Adjusted) -> Array:
 
 def _unlikelihood(adjusted: Adjusted) -> Array:
     """(V,) minus twice the log-likelihood of each picture left out."""
-    scales = left_out_scales(adjusted)
-    if adjusted.problem.stated:
-        scales = np.maximum(scales, 1.0)  # no better than stated
-    return np.asarray(2 * adjusted.freedom * np.log(scales))
+    return np.asarray(2 * adjusted.freedom * np.log(left_out_scales(adjusted)))
 
 
 def best_of(candidates: Sequence[Adjusted]) -> Adjusted:

@@ -1,9 +1,9 @@
 """The error of a camera's rays that follows from the covariance of its parameters, pixel by pixel.
 
-A turn of the camera turns all rays together and is part of the pose, not of the calibration: errors are stated after the
-turn that makes them least over the image (as the projection uncertainty of mrcal, whose reference is the cloud of
-points). With the derivatives J of the places of fixed directions by the parameters and T by a turn, P = 1 - T (T'T)^-1 T',
-the covariance is P J C J' P'.
+A turn of the camera turns all rays together and is part of the pose, not of the calibration: errors are stated after
+the turn that makes them least over the image (as the projection uncertainty of mrcal, whose reference is the cloud of
+points). With the derivatives J of the places of fixed directions by the parameters and T by a turn, the covariance is
+P J C J' P', for P = 1 - T (T'T)^-1 T'.
 """
 
 from __future__ import annotations

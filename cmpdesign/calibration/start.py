@@ -34,7 +34,9 @@ def first_guess(sheet: Sheet, sightings: Sequence[Sighting], size_px: tuple[int,
         placed = [_place(camera, sheet, one) for one in some]
         if any(view is None for view in placed):
             continue
-        errors = [_error_px(view, sheet, one) for view, one in zip(placed, some, strict=True) if view is not None]
+        errors = [
+            _error_px(view, sheet, one) for view, one in zip(placed, some, strict=True) if view is not None
+        ]
         cost = float(np.median(errors))
         if cost < least:
             best, least = camera, cost
@@ -126,4 +128,4 @@ def _nearest_coefficients(view: View, model: CameraModel, size_px: tuple[int, in
         out[[0, 1, 4, 5, 6, 7]] = solved
         return out
     columns = lens.by_coefficients(along)[:, 0]
-    return np.linalg.lstsq(columns, wanted - lens.distort(along).xy[:, 0], rcond=1e-10)[0]
+    return np.asarray(np.linalg.lstsq(columns, wanted - lens.distort(along).xy[:, 0], rcond=1e-10)[0])
