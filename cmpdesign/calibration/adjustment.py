@@ -1,8 +1,8 @@
 """Bundle adjustment of one camera over many pictures of a sheet: Levenberg-Marquardt on blocks.
 
 The unknowns are the camera's parameters and the sheet's shape, common to all pictures, and one pose a picture. The
-poses are eliminated picture by picture (Schur's complement), so that the system to solve has the size of the common part.
-Every picture has its own scale of errors, estimated from its residuals, so that a picture that contradicts weighs
+poses are eliminated picture by picture (Schur's complement), so that the system to solve has the size of the common
+part. Every picture has its own scale of errors, estimated from its residuals, so that a picture that contradicts weighs
 little; points beyond ``HUBER`` deviations weigh less (Huber 1964).
 """
 

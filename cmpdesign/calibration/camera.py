@@ -134,7 +134,7 @@ def calibrate_points(
             )
         kept = replace(problem, sightings=tuple(sightings[int(i)] for i in used))
         views = tuple(whole.guess.views[int(i)] for i in used)
-        adjusted = choose_model(kept, Guess(views, whole.guess.shape[:0]), models)
+        adjusted = choose_model(kept, Guess(views, whole.guess.shape[:0]), [whole.problem.model])
     advice = best_further_view(adjusted)
     _require_focal_length(adjusted, advice)
     ray_px = ray_rms_px(adjusted.camera, adjusted.lens_cov, size_px)

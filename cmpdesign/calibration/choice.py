@@ -3,7 +3,8 @@
 The adjustment without picture v differs from the whole one by the step (S - S_v)^-1 b_v in the common unknowns, for
 their information S, the picture's part S_v and its part b_v of the gradient; the picture's squares then change by
 2 b_v' step + step' S_v step. So leaving out each picture in turn costs no further adjustment. Models are compared by
-the likelihood of the pictures left out, each with a scale of its own, so that a picture that contradicts decides nothing.
+the likelihood of the pictures left out, each with a scale of its own, so that a picture that contradicts decides
+nothing.
 """
 
 from __future__ import annotations
@@ -52,8 +53,10 @@ def best_of(candidates: Sequence[Adjusted]) -> Adjusted:
 def choose_model(problem: Problem, start: Guess, models: Sequence[CameraModel] = MODELS) -> Adjusted:
     """The likeliest model of the lens, and a flat or a bent sheet; the fields of ``problem`` for these are ignored."""
     flat = best_of(_fitted(problem, start, models, bent=False))
-    bent = best_of(_fitted(problem, flat.guess, models, bent=True))
-    return best_of([flat, bent])
+    (bent,) = _fitted(problem, flat.guess, [flat.problem.model], bent=True)
+    if best_of([flat, bent]) is flat:
+        return flat
+    return best_of(_fitted(problem, bent.guess, models, bent=True))
 
 
 def _fitted(problem: Problem, start: Guess, models: Sequence[CameraModel], *, bent: bool) -> list[Adjusted]:

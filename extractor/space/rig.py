@@ -57,6 +57,7 @@ MEDIUM_FIELDS = ("gel_mm", "gel_index", "window_mm", "window_index")
 OTHER_TABLES = (
     "size_px", "seed", "camera", "surface", "contact", "light", "background", "optics", "sensor", "damage", "inks",
     "sequence", "name", "description", "source", "patterns", "elastomer", "response", "load", "conditions",
+    "layout", "calibration",
 )  # fmt: skip
 MAX_BYTES = 1 << 24  # of a rig file
 MAX_VIEWS = 64

@@ -1,0 +1,77 @@
+"""Documents of the commands that calibrate cameras and rigs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
+
+from cmpdesign.cli.documents.document import Document, Part
+
+if TYPE_CHECKING:
+    from cmpdesign.api.calibration import CalibratedCamera
+
+
+class CalibrationPicturePart(Part):
+    """One picture of a calibration."""
+
+    picture: str
+    points: int = Field(description="Markers measured.")
+    rms_px: float | None = Field(description="RMS residual per axis; null for a picture that is not read.")
+    cause: str = Field(description="Why the picture is left out; empty for a picture that is used.")
+
+
+class CalibrateCameraDocument(Document):
+    """The result of ``calibrate camera``."""
+
+    format: Literal["cmp-calibration-camera"] = "cmp-calibration-camera"
+    version: Literal[1] = 1
+    written: tuple[str, ...]
+    size_px: tuple[int, int]
+    model: str
+    response: str | float = Field(
+        description="Relation of light and values with which the pictures were read."
+    )
+    parameters: dict[str, float]
+    deviations: dict[str, float] = Field(description="Standard deviations of the parameters.")
+    held: tuple[str, ...] = Field(description="Parameters that the pictures do not determine.")
+    rms_px: float = Field(description="RMS residual per axis.")
+    scale: float = Field(description="Residuals over the stated deviations of the markers; 1 is right.")
+    ray_px: float = Field(
+        description="RMS deviation of the rays over the image, per axis, after a common turn."
+    )
+    sheet_bend_mm: float = Field(description="Height of the sheet's shape; 0 for a flat sheet.")
+    further_view: str = Field(description="The view to add that would help most.")
+    further_view_ray_px: float
+    pictures: tuple[CalibrationPicturePart, ...]
+
+    @classmethod
+    def of(cls, result: CalibratedCamera, written: tuple[str, ...]) -> CalibrateCameraDocument:
+        """The document of a result."""
+        found = result.calibration
+        values = found.camera.focal_px + found.camera.centre_px + found.camera.distortion
+        deviations = found.cov.diagonal() ** 0.5
+        pictures = [
+            CalibrationPicturePart(picture=one.name, points=one.points, rms_px=one.rms_px, cause=one.cause)
+            for one in found.pictures
+        ]
+        pictures += [
+            CalibrationPicturePart(picture=name, points=0, rms_px=None, cause=f"not read: {reason}")
+            for name, reason in result.unread.items()
+        ]
+        return cls(
+            written=written,
+            size_px=found.adjusted.problem.size_px,
+            model=found.model.name,
+            response=result.response,
+            parameters=dict(zip(found.model.names, values, strict=True)),
+            deviations=dict(zip(found.model.names, map(float, deviations), strict=True)),
+            held=found.held,
+            rms_px=found.rms_px,
+            scale=found.adjusted.base,
+            ray_px=found.ray_px,
+            sheet_bend_mm=found.bend_mm,
+            further_view=found.advice.text,
+            further_view_ray_px=found.advice.ray_px,
+            pictures=tuple(pictures),
+        )
