@@ -32,7 +32,7 @@ PACKAGES = ("extractor", "cmpdesign")
 # A room imports only those that stand before it.
 ROOMS = {
     "cmpdesign": (
-        "errors libraries units workers watch inputs patterns design layout files reading contact scene products"
+        "errors libraries units workers watch inputs patterns design layout files reading calibration contact scene products"
         " tracking evaluate data api proposal cli demo __main__"
     ),
     "extractor": (
