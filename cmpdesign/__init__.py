@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from cmpdesign.api.plots import plot_history as plot_history
     from cmpdesign.api.plots import plot_layout as plot_layout
     from cmpdesign.api.plots import plot_markers as plot_markers
-    from cmpdesign.api.sequences import ShapeOptions as ShapeOptions
     from cmpdesign.api.sequences import load_run as load_run
     from cmpdesign.api.sequences import open_source as open_source
     from cmpdesign.api.sequences import reconstruct as reconstruct
+    from cmpdesign.api.sequences import recover_run as recover_run
     from cmpdesign.api.sequences import track as track
     from cmpdesign.api.workshop import calibrate_pattern as calibrate_pattern
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
@@ -67,6 +67,9 @@ if TYPE_CHECKING:
     from cmpdesign.layout.checks import check_design as check_design
     from cmpdesign.products.drawing.svg import write_svg as write_svg
     from cmpdesign.proposal.camera_design import size as size
+    from cmpdesign.tracking.jobs.options import SequenceOptions as SequenceOptions
+    from cmpdesign.tracking.jobs.options import ShapeOptions as ShapeOptions
+    from cmpdesign.tracking.jobs.options import TrackOptions as TrackOptions
 
 __version__ = "0.1.0"
 
@@ -77,7 +80,9 @@ _HOMES = {
     "InputError": "cmpdesign.errors",
     "Layout": "cmpdesign.api.layouts",
     "OutputError": "cmpdesign.errors",
-    "ShapeOptions": "cmpdesign.api.sequences",
+    "SequenceOptions": "cmpdesign.tracking.jobs.options",
+    "ShapeOptions": "cmpdesign.tracking.jobs.options",
+    "TrackOptions": "cmpdesign.tracking.jobs.options",
     "Verifier": "cmpdesign.api.pictures",
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
@@ -99,6 +104,7 @@ _HOMES = {
     "plot_markers": "cmpdesign.api.plots",
     "read_layout": "cmpdesign.api.layouts",
     "reconstruct": "cmpdesign.api.sequences",
+    "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
     "render_sequence": "cmpdesign.api.pictures",
     "run_experiment": "cmpdesign.api.workshop",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -37,20 +38,12 @@ PresetOption = Annotated[
 
 FramesOption = Annotated[int | None, typer.Option("--frames", min=1, help="Stop after this many frames.")]
 
+LayoutArgument = Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")]
+
 SourcesArgument = Annotated[
     list[str],
     typer.Argument(
         metavar="SOURCE",
         help='Pictures, folders, patterns such as "run*/*.png", a video, a camera\'s number, or rtsp://...',
-    ),
-]
-
-TimesOption = Annotated[
-    str | None,
-    typer.Option(
-        "--times",
-        metavar="names|index|FILE",
-        help="Times of the frames: the names' numbers, the count, or a .csv of FRAME,SECONDS. [default: what the names "
-        "say; a video's own]",
     ),
 ]

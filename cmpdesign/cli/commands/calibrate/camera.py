@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -57,7 +57,7 @@ def camera(
 ) -> None:
     """Calibrate a camera: focal lengths, principal point, distortion, with covariances. Take pictures at many tilts."""
     from cmpdesign.api.calibration import calibrate_camera
-    from cmpdesign.cli.documents.calibration import CalibrateCameraDocument
+    from cmpdesign.documents.calibration import CalibrateCameraDocument
     from cmpdesign.watch import watched
 
     require_suffix("--output", output, [".toml"])
@@ -70,7 +70,38 @@ def camera(
     _print_figures(result)
     for path in result.written:
         say(f"wrote {printable_path(path)}")
-    finish(lambda: CalibrateCameraDocument.of(result, tuple(map(printable_path, result.written))))
+    written = tuple(map(printable_path, result.written))
+    finish(lambda: CalibrateCameraDocument(written=written, **_figures(result)))
+
+
+def _figures(result: CalibratedCamera) -> dict[str, Any]:
+    """The fields of ``CalibrateCameraDocument`` that describe the camera."""
+    found = result.calibration
+    view, names = found.camera, found.model.names
+    values = view.focal_px + view.centre_px + view.distortion
+    pictures = [
+        {"picture": one.name, "points": one.points, "rms_px": one.rms_px, "cause": one.cause}
+        for one in found.pictures
+    ]
+    pictures += [
+        {"picture": name, "points": 0, "rms_px": None, "cause": f"not read: {reason}"}
+        for name, reason in result.unread.items()
+    ]
+    return {
+        "size_px": found.adjusted.problem.size_px,
+        "model": found.model.name,
+        "response": result.response,
+        "parameters": dict(zip(names, values, strict=True)),
+        "deviations": dict(zip(names, map(float, found.cov.diagonal() ** 0.5), strict=True)),
+        "held": found.held,
+        "rms_px": found.rms_px,
+        "scale": found.adjusted.base,
+        "ray_px": found.ray_px,
+        "sheet_bend_mm": found.bend_mm,
+        "further_view": found.advice.text,
+        "further_view_ray_px": found.advice.ray_px,
+        "pictures": pictures,
+    }
 
 
 def _print_figures(result: CalibratedCamera) -> None:

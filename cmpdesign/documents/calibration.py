@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from cmpdesign.cli.documents.document import Document, Part
-
-if TYPE_CHECKING:
-    from cmpdesign.api.calibration import CalibratedCamera
+from cmpdesign.documents.document import Document, Part
 
 
 class CalibrationPicturePart(Part):
@@ -44,34 +41,3 @@ class CalibrateCameraDocument(Document):
     further_view: str = Field(description="The view to add that would help most.")
     further_view_ray_px: float
     pictures: tuple[CalibrationPicturePart, ...]
-
-    @classmethod
-    def of(cls, result: CalibratedCamera, written: tuple[str, ...]) -> CalibrateCameraDocument:
-        """The document of a result."""
-        found = result.calibration
-        values = found.camera.focal_px + found.camera.centre_px + found.camera.distortion
-        deviations = found.cov.diagonal() ** 0.5
-        pictures = [
-            CalibrationPicturePart(picture=one.name, points=one.points, rms_px=one.rms_px, cause=one.cause)
-            for one in found.pictures
-        ]
-        pictures += [
-            CalibrationPicturePart(picture=name, points=0, rms_px=None, cause=f"not read: {reason}")
-            for name, reason in result.unread.items()
-        ]
-        return cls(
-            written=written,
-            size_px=found.adjusted.problem.size_px,
-            model=found.model.name,
-            response=result.response,
-            parameters=dict(zip(found.model.names, values, strict=True)),
-            deviations=dict(zip(found.model.names, map(float, deviations), strict=True)),
-            held=found.held,
-            rms_px=found.rms_px,
-            scale=found.adjusted.base,
-            ray_px=found.ray_px,
-            sheet_bend_mm=found.bend_mm,
-            further_view=found.advice.text,
-            further_view_ray_px=found.advice.ray_px,
-            pictures=tuple(pictures),
-        )
