@@ -1,6 +1,6 @@
 """Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
 
-Every command is also one call by the same name:
+Every command has its call:
 
     design = cmpdesign.load("tac3d", layers=8)      a design; design.layout, design.check(), design.write("out")
     cmpdesign.size((1280, 960), (24, 18))           a design for a camera and its field of view
@@ -8,7 +8,7 @@ Every command is also one call by the same name:
     cmpdesign.verify("layout.json", "photo.png")    a verdict on a picture; extractor.Extractor reads without a verdict
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
-    cmpdesign.kerf, laser_grid, calibrate_pattern, run_experiment, export_lerobot, export_zarr
+    cmpdesign.kerf, laser_grid, calibrate_camera, calibrate_pattern, run_experiment, export_lerobot, export_zarr
 
 The rooms of the package, each of which imports only rooms above it, left column first:
 
@@ -29,6 +29,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cmpdesign.api.calibration import calibrate_camera as calibrate_camera
     from cmpdesign.api.datasets import dataset as dataset
     from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
@@ -85,6 +86,7 @@ _HOMES = {
     "TrackOptions": "cmpdesign.tracking.jobs.options",
     "Verifier": "cmpdesign.api.pictures",
     "build_layout": "cmpdesign.api.layouts",
+    "calibrate_camera": "cmpdesign.api.calibration",
     "calibrate_pattern": "cmpdesign.api.workshop",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",

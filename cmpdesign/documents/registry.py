@@ -8,7 +8,7 @@ from typing import Union
 
 from pydantic import TypeAdapter
 
-from cmpdesign.documents import data, designs, reading, runs
+from cmpdesign.documents import calibration, data, designs, reading, runs
 from cmpdesign.documents.document import Document, Message
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.names import nearest_name
@@ -28,6 +28,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "dataset": (data.DatasetDocument,),
     "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument, reading.GridDocument),
+    "calibrate camera": (calibration.CalibrateCameraDocument,),
     "calibrate pattern": (reading.CalibratePatternDocument,),
     "export lerobot": (runs.ExportDocument,),
     "export zarr": (runs.ExportDocument,),

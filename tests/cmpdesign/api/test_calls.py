@@ -28,6 +28,7 @@ CALLS = {
     "build": "load",
     "check": "load",
     "evaluate": "run_experiment",
+    "calibrate camera": "calibrate_camera",
     "calibrate pattern": "calibrate_pattern",
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
