@@ -132,6 +132,31 @@ def write_file(path: str | Path, content: str | bytes) -> None:
             staged.write_bytes(_to_bytes(content))
 
 
+def write_new_file(path: str | Path, content: str | bytes) -> bool:
+    """Write a file as ``write_file`` does, unless another process has made it: of two processes, one gets False.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    path = Path(path)
+    with _as_output_error(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with Stage(path.parent) as stage:
+            staged = stage.folder / "staged"
+            staged.write_bytes(_to_bytes(content))
+            sync_file(staged)
+            try:
+                os.link(staged, path)
+            except FileExistsError:
+                return False
+            except OSError:  # a file system without a second name of a file
+                if path.exists():
+                    return False
+                staged.rename(path)
+            sync_folder(path.parent)
+    return True
+
+
 def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Path]:
     """Write several files into a folder: all are complete on disk before the first one is renamed into place.
 
