@@ -36,14 +36,14 @@ EXTRAS = {
 _DISTRIBUTIONS = {
     "OCP": "cadquery-ocp-novtk",
     "PIL": "pillow",
-    "cv2": "opencv-python-headless",
+    "cv2": "opencv-contrib-python-headless",
     "foxglove": "foxglove-sdk",
     "rerun": "rerun-sdk",
 }
 # Distributions that bring OpenCV; the first is required. Each suffices; two in one environment overwrite each other.
 OPENCV_DISTRIBUTIONS = (
-    "opencv-python-headless",
     "opencv-contrib-python-headless",
+    "opencv-python-headless",
     "opencv-python",
     "opencv-contrib-python",
 )

@@ -66,7 +66,8 @@ def _tile(picture: TracedPicture, entry: Mapping[str, Any]) -> NDArray[np.uint8]
     tile = np.full((TILE_PX[1] + CAPTION_PX, TILE_PX[0], 3), PAPER_BGR, dtype=np.uint8)
     tile[: TILE_PX[1]] = cv2.resize(image, TILE_PX, interpolation=cv2.INTER_AREA)
     scale = TILE_PX[0] / width
-    for x, y in picture.truth.xy_px[entry["unmeasured"]] * scale + 0.5 * (scale - 1):
+    lost = entry["unmeasured"] if entry["measured"] else []
+    for x, y in picture.truth.xy_px[lost].reshape(-1, 2) * scale + 0.5 * (scale - 1):
         cv2.circle(tile, (round(16 * x), round(16 * y)), 16 * DOT_PX, UNMEASURED_BGR, -1, cv2.LINE_AA, 4)
     counts = f"{entry['measured']} of {entry['visible']}" if entry["visible"] else "no pattern"
     effects = ", ".join(picture.effects)

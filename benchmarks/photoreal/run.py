@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -112,7 +111,3 @@ def main(arguments: list[str] | None = None) -> int:
         for path in publish(found[options.preset[0]]):
             print(f"wrote {path}")
     return int(failed)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from cmpdesign.api.layouts import reference_from
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import CmpDesignError, OutputError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.live.options import Live, LiveKind
 from cmpdesign.tracking.recording.options import DEFAULT_FRAME_ID, Recording
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from extractor.pipeline import Side
     from extractor.presets import Preset
 
-Watch = Callable[[Any], None]
 AnySource = str | Path | int | Sequence[str | Path]
 
 
@@ -98,11 +97,12 @@ class Reading:
     @property
     def viewer(self) -> Live | None:
         """The live server's options."""
-        if self.live is None:
-            if self.live_port is not None or self.live_wait_s:
-                raise CmpDesignError("--live-port and --live-wait need --live")
-            return None
-        return Live(self.live, self.live_port, self.live_wait_s)
+        if self.live is not None:
+            return Live(self.live, self.live_port, self.live_wait_s)
+        if self.live_port is not None or self.live_wait_s:
+            port, wait, needed = map(parameter, ("live_port", "live_wait_s", "live"))
+            raise CmpDesignError(f"{port} and {wait} need {needed}")
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ def track(
     mm_per_px: float | None = None,
     overlay: str | Path | None = None,
     quiver: str | Path | None = None,
-    watch: Watch = lambda frame: None,
+    watch: Callable[[Any], None] = lambda frame: None,
     **reading: Unpack[ReadingOptions],
 ) -> Followed:
     """Follow a pattern through a video, a folder or a camera into a table, as the command ``track`` does.
@@ -179,7 +179,7 @@ def reconstruct(
     source: str | Path | int | Sequence[str | Path | int],
     output: str | Path,
     *,
-    watch: Watch = lambda frame: None,
+    watch: Callable[[Any], None] = lambda frame: None,
     shape: ShapeOptions | None = None,
     **reading: Unpack[ReadingOptions],
 ) -> Followed:
@@ -269,7 +269,7 @@ class ShapeOptions:
         for name in ("flatness_mm", "model_px"):
             value = getattr(self, name)
             if value is not None and not 0 <= value < float("inf"):
-                raise CmpDesignError(f"{name} is {value:g}; expected a number from 0")
+                raise CmpDesignError(f"{parameter(name)} is {value:g}; expected a number from 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,7 +435,7 @@ class ReconstructJob:
 Job = TrackJob | ReconstructJob
 
 
-def follow(job: Job, watch: Watch) -> Followed:
+def follow(job: Job, watch: Callable[[Any], None]) -> Followed:
     """Follow a source to its end and write the summary; after a failure the summary covers the frames so far.
 
     Raises:
@@ -486,7 +486,7 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 
 def _require_positive(name: str, value: float | None) -> None:
     if value is not None and not 0 < value < float("inf"):
-        raise CmpDesignError(f"{name} is {value:g}; expected a number above 0")
+        raise CmpDesignError(f"{parameter(name)} is {value:g}; expected a number above 0")
 
 
 def _texts(source: AnySource) -> tuple[str, ...]:

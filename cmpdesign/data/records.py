@@ -35,7 +35,7 @@ class MarkersTable(Record):
     """[markers]: the reading of the markers from the encoded picture."""
 
     read: bool = True
-    preset: Literal["fast", "balanced", "accurate"] = "balanced"
+    preset: Literal["balanced", "accurate"] = "balanced"
 
 
 class DesignRecord(Record):
@@ -81,7 +81,7 @@ class LayoutRecord(Record):
 class ReadingRecord(Record):
     """Options of the reader."""
 
-    preset: Literal["fast", "balanced", "accurate"]
+    preset: Literal["balanced", "accurate"]
     response: Literal["srgb", "linear"] | float | None
     side: Literal["designed", "front", "back", "either"]
     channels: Literal["bgr", "rgb"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.errors import CmpDesignError, InputError, parameter
 from cmpdesign.files.image_header import size_in_header
 from cmpdesign.inputs.files import MOST_PIXELS, open_file, read_file
 
@@ -86,7 +86,7 @@ def decode_bytes(data: bytes, path: str | Path, most_pixels: int = MOST_PIXELS) 
     if size[0] * size[1] > most_pixels:
         raise ImageFileError(
             f"{path}: is {size[0]} x {size[1]} px, {size[0] * size[1] / 1e6:.4g} megapixels; the limit is "
-            f"{most_pixels / 1e6:.4g}; make it smaller, or raise the limit where the command has --max-pixels"
+            f"{most_pixels / 1e6:.4g}; make it smaller, or raise {parameter('max_pixels')}"
         )
     if data.startswith(b"\x89PNG") and size[0] * size[1] > PNG_PIXELS_PER_BYTE * len(data):
         raise ImageFileError(

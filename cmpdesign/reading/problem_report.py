@@ -23,7 +23,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from cmpdesign import __version__
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import Image, to_png
 from cmpdesign.inputs.names import Name
@@ -39,7 +39,7 @@ _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same bundle has the same bytes
 class Settings(Record):
     """Options of the reading."""
 
-    preset: Literal["fast", "balanced", "accurate"]
+    preset: Literal["balanced", "accurate"]
     response: Name | float | None
     channels: Literal["bgr", "rgb"]
     min_share: float = Field(ge=0, le=1)
@@ -99,7 +99,7 @@ class ProblemReport:
         if len(self._pictures) == MOST_PICTURES:
             raise CmpDesignError(
                 f"a report of a problem holds at most {MOST_PICTURES} pictures; give those that show the problem, "
-                "or fewer --frames"
+                f"or fewer {parameter('frames')}"
             )
         file = f"pictures/{name}"
         self._files[file] = content

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from cmpdesign.errors import parameter
 from cmpdesign.files.images import ImageFileError, is_image_file, read_image
 from cmpdesign.inputs.files import MOST_PIXELS, is_regular_file, path_exists
 from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind, is_stream_address, name_sources
@@ -314,7 +315,7 @@ def _require_frame_size(capture: Any, name: str, most_pixels: int) -> None:
     if width * height > most_pixels:
         raise SourceError(
             f"{name}: the frames have {width} x {height} px; the limit is {most_pixels / 1e6:.4g} megapixels "
-            "(--max-pixels)"
+            f"({parameter('max_pixels')})"
         )
 
 

@@ -86,7 +86,7 @@ def track(
     with_images: WithImagesOption = False,
     live: LiveOption = None,
     live_port: LivePortOption = None,
-    live_wait: LiveWaitOption = 0.0,
+    live_wait_s: LiveWaitOption = 0.0,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
     ] = False,
@@ -109,7 +109,7 @@ def track(
     from extractor import load_layout
 
     known = parse_reading_response(response)
-    shown = (with_images, live, live_port, live_wait)
+    shown = (with_images, live, live_port, live_wait_s)
     reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, *shown)
     job = TrackJob(load_layout(layout), tuple(source), output, reading, rest, mm_per_px, overlay, quiver)
     run = job.prepare()

@@ -31,7 +31,7 @@ SideOption = Annotated[
 ]
 
 PresetOption = Annotated[
-    Literal["fast", "balanced", "accurate"],
+    Literal["balanced", "accurate"],
     typer.Option("--preset", help="Speed or accuracy of the positions; the ids are the same."),
 ]
 
