@@ -25,6 +25,7 @@ EXTRAS = {
     "print": "sheets to print",
     "evaluate": "contact, error bounds, size, experiments, plots",
     "parquet": "tables as Parquet",
+    "video": "videos and network streams read",
     "recording": "recordings for ROS 2 and Foxglove",
     "export": "data sets for LeRobot and Diffusion Policy",
     "live": "frames shown in Foxglove during a run",

@@ -71,8 +71,7 @@ def layout_document(layout: Layout) -> dict[str, Any]:
 
 def file_version(layout: Layout) -> int:
     """2 for a layout with a field that version 1 does not know, else 1, so that earlier readers read the file."""
-    has_relief = layout.as_made is not None and layout.as_made.cell_height_mm != 0
-    return 2 if has_relief else 1
+    return 2 if layout.cell_height_mm else 1
 
 
 def pattern_digest(layout: Layout) -> str:

@@ -144,6 +144,11 @@ class Layout:
         outlines: NDArray[np.float64] = self.marker_xy_mm[self.cell_corners[self.colored_cells]]
         return outlines
 
+    @property
+    def cell_height_mm(self) -> float:
+        """Height of the cells over the black, towards the camera; negative: recessed; 0 for a flat pad."""
+        return 0.0 if self.as_made is None else self.as_made.cell_height_mm
+
     @cached_property
     def virtual_xy_mm(self) -> NDArray[np.float64]:
         """(E, m, 2) float64 mm: virtual marker j of m lies at the fraction (j + 1) / (m + 1) from the smaller id."""

@@ -44,3 +44,13 @@ SourcesArgument = Annotated[
         help='Pictures, folders, patterns such as "run*/*.png", a video, a camera\'s number, or rtsp://...',
     ),
 ]
+
+TimesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--times",
+        metavar="names|index|FILE",
+        help="Times of the frames: the names' numbers, the count, or a .csv of FRAME,SECONDS. [default: what the names "
+        "say; a video's own]",
+    ),
+]

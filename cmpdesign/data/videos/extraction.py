@@ -14,7 +14,7 @@ from cmpdesign.data.files.tables import Row, lost_values, marker_values
 from cmpdesign.data.folder import Prepared, file_digest, plan_digest, read_plan
 from cmpdesign.data.named_files import named_layouts
 from cmpdesign.data.records import FORMAT_EXTRACTION
-from cmpdesign.data.videos.pieces import Piece, VideoFrame, piece_frames, video_pieces
+from cmpdesign.data.videos.pieces import NumberedFrame, Piece, piece_frames, video_pieces
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import ImageFileError, is_image_file, read_image
 from cmpdesign.files.layout_json import layout_to_json, pattern_digest
@@ -163,7 +163,7 @@ def _extractor(folder: Path, digest: str) -> Extractor:
     return Extractor(layout, reading.preset, reading.response, reading.side, reading.channels)
 
 
-def _frames(source: Mapping[str, Any], piece: Piece) -> Iterator[VideoFrame]:
+def _frames(source: Mapping[str, Any], piece: Piece) -> Iterator[NumberedFrame]:
     if source["kind"] == "video":
         yield from piece_frames(Path(source["location"][0]), piece)
         return
@@ -172,4 +172,4 @@ def _frames(source: Mapping[str, Any], piece: Piece) -> Iterator[VideoFrame]:
             image = read_image(source["location"][number])
         except ImageFileError:
             image = None
-        yield VideoFrame(number, float("nan"), image)
+        yield NumberedFrame(number, float("nan"), image)
