@@ -251,7 +251,9 @@ def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPoly
         name,
         f"{layout.pattern}, {key.layers} layers, pitch {key.pitch_mm:.6g} mm, "
         f"{pad_width:.4g} x {pad_height:.4g} mm",
-        f"digest {layout.digest[:32]}",
+        f"digest {layout.digest[:32]}"
+        if layout.code is None
+        else f"code {layout.code.id}, digest {layout.digest[:32]}",
         f"{layout.digest[32:]}",
         f"print at 100 %, not fitted to the page; {side_text}",
     )
