@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from cmpdesign.inputs.names import Line, Name
+from cmpdesign.inputs.options import Preset
 from cmpdesign.inputs.records import MOST_COUNT, Digest, Record
 
 FORMAT_FRAMES, FORMAT_EXTRACTION = "cmp-dataset-plan", "cmp-extraction-plan"
@@ -35,7 +36,7 @@ class MarkersTable(Record):
     """[markers]: the reading of the markers from the encoded picture."""
 
     read: bool = True
-    preset: Literal["balanced", "accurate"] = "balanced"
+    preset: Preset = "balanced"
 
 
 class DesignRecord(Record):
@@ -81,7 +82,7 @@ class LayoutRecord(Record):
 class ReadingRecord(Record):
     """Options of the reader."""
 
-    preset: Literal["balanced", "accurate"]
+    preset: Preset
     response: Literal["srgb", "linear"] | float | None
     side: Literal["designed", "front", "back", "either"]
     channels: Literal["bgr", "rgb"]

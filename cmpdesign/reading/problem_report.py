@@ -27,6 +27,7 @@ from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import Image, to_png
 from cmpdesign.inputs.names import Name
+from cmpdesign.inputs.options import Preset
 from cmpdesign.inputs.records import Record, parse_record
 from cmpdesign.libraries import OPENCV_DISTRIBUTIONS
 
@@ -39,7 +40,7 @@ _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same bundle has the same bytes
 class Settings(Record):
     """Options of the reading."""
 
-    preset: Literal["balanced", "accurate"]
+    preset: Preset
     response: Name | float | None
     channels: Literal["bgr", "rgb"]
     min_share: float = Field(ge=0, le=1)

@@ -53,8 +53,8 @@ def build(
     are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
     prints are read as the camera sees the pads before files are written. Exit code 1: a finding is an error.
     """
-    from cmpdesign.cli.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
+    from cmpdesign.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.layout.build import build_layout
     from cmpdesign.layout.report import report_values
     from cmpdesign.products.building import build_files

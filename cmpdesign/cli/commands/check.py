@@ -39,8 +39,8 @@ def check(
     preset: PresetOption = "balanced",
 ) -> None:
     """List the features of a design that cannot be made or read. Exit code 1: a finding is an error."""
-    from cmpdesign.cli.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
+    from cmpdesign.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.layout.build import build_layout
     from cmpdesign.patterns.pad_code import code_figures
     from cmpdesign.products.building import check_products
