@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from cmpdesign.contact import ContactError
 from cmpdesign.contact.objects.heightmap import HeightMap
 from cmpdesign.data.frames.distributions import distribution_kind, is_drawn
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.images import ImageFileError, read_image
 from cmpdesign.inputs.files import MOST_DATA_BYTES, read_file
 from cmpdesign.inputs.sources import IMAGE_SUFFIXES
@@ -85,7 +85,9 @@ def _check_place(place: _Place, path: Path, folders: Sequence[Path]) -> None:
     except (OSError, ValueError, RuntimeError) as error:  # a NUL, a loop of links
         raise CmpDesignError(f"{path}: cannot be read ({error})") from None
     if not is_below:
-        raise CmpDesignError(f"{path} lies outside of the plan's folder; allow its folder by --inputs-from")
+        raise CmpDesignError(
+            f"{path} lies outside of the plan's folder; allow its folder by {parameter('inputs_from')}"
+        )
     _READERS[place.kind](path)
 
 

@@ -36,7 +36,7 @@ def print_made(folder: Path, made: Progress) -> None:
 
 def print_checked(folder: str, checked: Checked) -> None:
     """Print the result of a check, and end the command: with exit code 1 if a file is damaged."""
-    from cmpdesign.cli.documents.data import DatasetCheckDocument
+    from cmpdesign.documents.data import DatasetCheckDocument
 
     for problem in checked.problems:
         print_warning(problem)
