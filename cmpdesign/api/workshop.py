@@ -102,7 +102,7 @@ def calibrate_pattern(
         and Path(output).resolve() == Path(layout).resolve()
     ):
         raise CmpDesignError(f"{output} is the nominal layout itself; give another name")
-    names, pictures = _read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
+    names, pictures = read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
     learnt = learn_layout(
         reference_from(layout),
         pictures,
@@ -116,7 +116,7 @@ def calibrate_pattern(
     return learnt
 
 
-def _read_pictures(
+def read_pictures(
     images: Sequence[str | Path] | Sequence[NDArray[Any]], max_pixels: int
 ) -> tuple[list[str], list[NDArray[Any]]]:
     """The names and the pixels of pictures; a folder or a pattern stands for its pictures."""
