@@ -41,8 +41,8 @@ class RowBreakLimits(NamedTuple):
         agreement, agreeing_share: gridlines agree on a jump if this share of them differ from it by less than that part
             of it. Chosen.
         min_agreed_jump, min_strips: a break, too, are so many strips whose gridlines agree on such jumps. Chosen.
-        spread, concentrated: a tear has this share of the squared jumps within that distance of the largest; else it is
-            a rolling shutter. Chosen.
+        spread, concentrated: a tear has this share of the squared jumps within that distance of their centre; else it
+            is a rolling shutter. Chosen.
         beside: from the break, within which markers are not trusted. Chosen.
         repaired_beside: the same for markers that are repaired or fitted. Chosen.
         lost_jump: above which markers beside a break are lost. Chosen.
@@ -61,7 +61,7 @@ class RowBreakLimits(NamedTuple):
     agreeing_share: float = 0.6
     min_agreed_jump: float = 0.01
     min_strips: int = 4
-    spread: float = 1.7
+    spread: float = 2.0
     concentrated: float = 0.7
     beside: float = 0.75
     repaired_beside: float = 1.5
@@ -126,9 +126,9 @@ def _along_rows(rows: _Strips, columns: _Strips, edge: float) -> RowBreak:
     largest = float(rows.jump.max(initial=0.0))
     if largest <= least and np.count_nonzero(are_agreed) < LIMITS.min_strips:
         return NO_BREAK
-    peak = rows.middle[int(rows.jump.argmax())]
-    near = np.abs(rows.middle - peak) < LIMITS.spread * edge
     squares = rows.jump**2
+    centre = float(np.average(rows.middle, weights=squares))
+    near = np.abs(rows.middle - centre) < LIMITS.spread * edge
     if squares[near].sum() < LIMITS.concentrated * squares.sum():
         return RowBreak("rolling shutter", largest, rows.middle, rows.jump, edge)
     row = float(np.average(rows.middle[near], weights=squares[near]))
