@@ -12,6 +12,7 @@ from benchmarks.photoreal.page import documentation_blocks, pictures_sheet
 from benchmarks.photoreal.report import family_rows, measured_record
 from benchmarks.photoreal.run import main
 from benchmarks.suites.photoreal.pictures import (
+    NO_PATTERN,
     PICTURES_FOLDER,
     TracedPicture,
     first_of_families,
