@@ -152,7 +152,7 @@ def beside_row_break(found: RowBreak, markers: RepairedMarkers) -> RepairedMarke
         around = np.where(away < found.edge_px, found.jumps_px, 0.0).max(axis=1, initial=0.0)
         around = np.maximum(around, np.sqrt(np.mean(found.jumps_px**2)))  # at the rim no strip tells
         cov += (LIMITS.rolling_share * around)[:, None, None] ** 2 * np.eye(2)
-        guessed = status > Status.MEASURED
+        guessed = (status > Status.MEASURED) & (found.jump_px > LIMITS.lost_jump * found.edge_px)
         xy[guessed], cov[guessed], status[guessed] = np.nan, np.nan, Status.LOST
         return RepairedMarkers(xy, cov, status)
     distance = np.abs(xy[:, 1, None] - found.rows_px).min(axis=1)
