@@ -1,6 +1,6 @@
 """Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
 
-Every command is also one call by the same name:
+Every command has its call:
 
     design = cmpdesign.load("tac3d", layers=8)      a design; design.layout, design.check(), design.write("out")
     cmpdesign.size((1280, 960), (24, 18))           a design for a camera and its field of view

@@ -16,7 +16,7 @@ HEAD = """# Python
 
 <!-- written by python -m docs.figures -->
 
-Whatever a command does is one call of `cmpdesign`; `extractor` reads pictures and needs numpy and OpenCV alone.
+Most commands are one call of `cmpdesign`; `extractor` reads pictures and needs numpy and OpenCV alone.
 [From Python](../how-to/python.md) shows how they are used together. `help(NAME)` prints what stands here.
 """
 EXAMPLE = re.compile(r"^(>>> |\.\.\. )|  # doctest: .*$", re.MULTILINE)
