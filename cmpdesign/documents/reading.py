@@ -19,6 +19,10 @@ class QualityPart(Part):
     evenness: float | None = Field(description="Evenness of the light, 0 to 1.")
     edge_px: float | None = Field(description="Median length of a gridline, px.")
     weakest_inks: tuple[str, ...]
+    row_fault: Literal["torn", "rolling shutter"] | None = Field(
+        None, description="A break of the image along a row."
+    )
+    row_jump_px: float | None = Field(None, description="How far the image jumps there, px.")
     hints: tuple[str, ...] = Field(description="Causes that limit the result, with remedies.")
 
 
