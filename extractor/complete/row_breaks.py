@@ -49,6 +49,8 @@ class RowBreakLimits(NamedTuple):
         rolling_share: of the jump around, that is the deviation of a marker under a rolling shutter. Chosen.
         min_lost, lost_share, lost_reach: at a tear, at least so many markers, and this share of all within the reach of
             a row, are lost. Chosen.
+        cover_edges, most_apart: where both sides of lost rows, extrapolated by so many edges, differ by less than
+            that, the markers are covered and nothing is torn. Chosen.
     """
 
     bin: float = 1 / 3
@@ -70,6 +72,8 @@ class RowBreakLimits(NamedTuple):
     min_lost: int = 7
     lost_share: float = 0.75
     lost_reach: float = 0.4
+    cover_edges: int = 2
+    most_apart: float = 0.2
 
 
 LIMITS = RowBreakLimits()
@@ -227,9 +231,20 @@ def _lost_along_a_row(topology: Topology, xy: Points, size_px: tuple[int, int], 
     inside = np.all((place >= 0) & (place < size_px), axis=1)
     place, known = place[inside], known[inside]
     rows, columns = (_lost_lines(place[:, axis], known, edge) for axis in (1, 0))
-    if len(rows) == 0 or len(columns):
+    if len(rows) == 0 or len(columns) or _goes_on_across(topology, xy, rows, edge):
         return NO_BREAK
     return RowBreak("torn", edge, rows, np.full(len(rows), edge), edge)
+
+
+def _goes_on_across(topology: Topology, xy: Points, rows_px: Points, edge: float) -> bool:
+    """Whether the markers above and below the rows predict the same places between: they are covered, not torn."""
+    row = float(np.mean(rows_px))
+    above, below = (np.where(side[:, None], xy, np.nan) for side in (xy[:, 1] < row, xy[:, 1] > row))
+    for _ in range(LIMITS.cover_edges):
+        above, below = (extrapolate_pattern(part, topology).xy for part in (above, below))
+    apart = np.hypot(*(above - below)[~np.isfinite(xy[:, 0])].T)
+    apart = apart[np.isfinite(apart)]
+    return len(apart) >= LIMITS.min_gridlines and bool(np.median(apart) < LIMITS.most_apart * edge)
 
 
 def _lost_lines(place: Points, known: NDArray[np.bool_], edge: float) -> Points:
