@@ -77,7 +77,10 @@ class Command(TyperCommand):
 
     def _spelled(self, name: str, value: str | None) -> str:
         """A parameter as the command line writes it; a word of another command for what this command does not have."""
-        written = {each.name: each.opts[-1] for each in self.params if each.opts[-1].startswith("--")}
+        written = {
+            each.name: each.opts[-1] if each.opts[-1].startswith("--") else each.name.upper()
+            for each in self.params
+        }
         option = written.get(name, f"--{name.replace('_', '-')}")
         return option if value is None else f"{option} {value}"
 

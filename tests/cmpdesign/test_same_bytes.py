@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from cmpdesign.cli import app
 
 # The job sheet and the report are text; every other suffix is a writer's format.
-SUFFIXES = {".svg", ".json", ".png", ".step", ".stl", ".glb", ".3mf", ".html", ".pdf"}
+SUFFIXES = {".svg", ".json", ".png", ".step", ".stl", ".glb", ".3mf", ".html", ".pdf", ".csv"}
 
 
 def test_every_format_is_the_same_in_another_process(tmp_path: Path) -> None:

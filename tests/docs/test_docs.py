@@ -239,7 +239,7 @@ def test_stated_limits_hold() -> None:
         ("250 megapixels", inputs.MOST_PIXELS == 250_000_000),
         ("40 levels, numbers of 300 digits", (documents.MOST_LEVELS, documents.MOST_DIGITS) == (40, 300)),
         ("100; 1000 characters", (lines.MOST_NAME_LETTERS, lines.MOST_LINE_LETTERS) == (100, 1000)),
-        ("at most 300 characters", MOST_LINE_LETTERS == 300),
+        ("at most 1000 characters", MOST_LINE_LETTERS == 1000),
         ("25,000,000 heights", MOST_HEIGHTS == 25_000_000),
     ):
         assert limit and text in page, text

@@ -213,7 +213,7 @@ def test_square_patterns_are_refused_in_one_line(tmp_path: Path) -> None:
     # check, build and verify agree: nothing of it is numbered.
     assert run("check", "square").exit_code == 1
     built = run("build", "square", "-o", tmp_path, "--only", "layout")
-    assert built.exit_code == 1 and "extractor reads triangles only" in built.stderr
+    assert built.exit_code == 1 and "the extractor reads cells with three corners only" in built.stderr
     assert run("render", tmp_path / "layout.json", "-o", tmp_path / "image.png").exit_code == 0
     assert "square" in refused("verify", tmp_path / "layout.json", tmp_path / "image.png")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from typing import Annotated, Any, TypedDict, Unpack, get_args
+from typing import Annotated, Any, TypedDict, Unpack, get_args, get_type_hints
 
 import pytest
 import typer
@@ -16,15 +16,14 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs import options
 from cmpdesign.inputs.options import Usual, options_of, settled
 from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions, TrackOptions
-from extractor.image import input as images
-from extractor.pipeline import Side
-from extractor.presets import PRESETS
+from extractor import Extractor
 
 
 def test_the_choices_are_the_extractors() -> None:
-    assert get_args(options.Preset) == PRESETS
-    assert get_args(options.Side) == get_args(Side)
-    assert get_args(options.Channels) == get_args(images.Channels)
+    taken = get_type_hints(Extractor.__init__)
+    assert get_args(options.Preset) == get_args(taken["preset"])
+    assert get_args(options.Side) == get_args(taken["side"])
+    assert get_args(options.Channels) == get_args(taken["channels"])
 
 
 @pytest.mark.parametrize(("name", "record"), [("track", TrackOptions), ("reconstruct", ShapeOptions)])

@@ -274,7 +274,7 @@ def test_bad_choices_are_one_line(tmp_path: Path) -> None:
         (("response", "-o", tmp_path, "--sensor", "tac4d"), "did you mean tac3d?"),
         (
             ("response", "-o", tmp_path, "--preset", "best"),
-            "--preset': 'best' is not one of 'fast', 'balanced'",
+            "--preset': 'best' is not one of 'balanced', 'accurate'",
         ),
     ):
         assert message in evaluate(*arguments, code=2)

@@ -85,5 +85,5 @@ def test_pictures_of_a_product_are_shown_in_the_preview(monkeypatch: pytest.Monk
 
 def test_choosing() -> None:
     assert chosen_products("report , svg,svg") == ["svg", "report"]
-    with pytest.raises(CmpDesignError, match="--only mould: unknown; there are svg"):
+    with pytest.raises(CmpDesignError, match="products mould: unknown; there are svg"):
         chosen_products("mould")

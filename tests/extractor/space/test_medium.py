@@ -196,7 +196,7 @@ def test_the_likely_cause_of_a_misfit_at_rest_is_named(cause: str) -> None:
         surface = pressed(LAYOUT.xy_mm, 0.4)
     rest = [noisy(LAYOUT, view, surface, rng, 0.003) for view in views]
     (warning,) = Reconstructor(LAYOUT, rig, rest).warnings
-    named = {"medium": "[medium]", "lens": "focal_px", "poses": "--from-rest", "surface": "flatness_mm"}
+    named = {"medium": "[medium]", "lens": "focal_px", "poses": "(from_rest)", "surface": "flatness_mm"}
     assert [key for key, text in named.items() if text in warning] == [cause]
 
 
