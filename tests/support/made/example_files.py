@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.lenses.cameras import random_camera
+from benchmarks.suites.lenses.pictures import Conditions, take_pictures
 from cmpdesign import load, write_layout
 from cmpdesign.files.images import read_image
 from cmpdesign.products.laser.coupon.design import coupon_to_json, design_coupon
+from cmpdesign.products.laser.grid.design import design_grid
 from cmpdesign.products.laser.setup import complete_setup
 from tests.support.command import run
 from tests.support.laser_tools import coupon_photo
 from tests.support.layouts import small_text
-from tests.support.made.datasets import write_plan
+from tests.support.made.datasets import make_serially, write_plan
 from tests.support.made.rest_pictures import nominal_layout, write_rest_images
 from tests.support.tracking.press import write_press
 from tests.support.tracking.scenes import LAYERS, moving
 
 FRAMES = 3
+SHEET_PICTURES = 5
 
 
 def prepare_files(folder: Path, command: str) -> Path:
@@ -39,10 +45,12 @@ def prepare_files(folder: Path, command: str) -> Path:
         case "calibrate":
             write_layout(nominal_layout(), folder / "layout.json")
             write_rest_images(folder / "rest")
+            _write_sheet(folder / "sheet")
         case "kerf":
             _write_coupon(folder)
+            _write_grid(folder)
         case "dataset":
-            write_plan(folder, frames=2)
+            make_serially(write_plan(folder, frames=2), folder / "published")
         case "render":
             (folder / "layout.json").write_text(small_text("honeycomb", LAYERS), encoding="utf-8")
         case "verify" | "track" | "extract" | "export":
@@ -74,9 +82,27 @@ def _write_video(path: Path, images: Sequence[NDArray[Any]]) -> None:
     video.release()
 
 
+def _write_sheet(folder: Path) -> None:
+    """Pictures of a printed sheet, enough for a calibration, by one camera."""
+    rng = np.random.default_rng(46)
+    folder.mkdir()
+    pictures = take_pictures(random_camera(rng, 60, 61), nominal_layout(), SHEET_PICTURES, Conditions(), rng)
+    for number, picture in enumerate(pictures):
+        cv2.imwrite(str(folder / f"{number}.png"), picture)
+
+
 def _write_coupon(folder: Path) -> None:
     piece = design_coupon(complete_setup(load("honeycomb").laser))
     photo = coupon_photo(piece, {patch.name: (0.1, 0.12) for patch in piece.patches}, scale_px_mm=11.8)
     (folder / "coupon.json").write_text(coupon_to_json(piece), encoding="utf-8")
-    for name in ("scan.png", "photo.jpg"):
-        cv2.imwrite(str(folder / name), photo)
+    cv2.imwrite(str(folder / "scan.png"), photo)
+
+
+def _write_grid(folder: Path) -> None:
+    """A grid of settings, and its photo: the windows of the slower half of the fields fell out."""
+    grid = design_grid(complete_setup(load("honeycomb").laser))
+    middle = np.median([patch.speed_mm_s for patch in grid.patches])
+    cut = [patch for patch in grid.patches if patch.speed_mm_s <= middle]
+    photo = coupon_photo(replace(grid, patches=tuple(cut)), {patch.name: (0.15, 0.15) for patch in cut})
+    (folder / "grid.json").write_text(coupon_to_json(grid), encoding="utf-8")
+    cv2.imwrite(str(folder / "photo.jpg"), photo)

@@ -13,9 +13,8 @@ from cmpdesign.cli.progress import working
 from cmpdesign.errors import CmpDesignError
 
 EXAMPLES = (
-    "cmpdesign dataset plan.toml -o pressed",
     "cmpdesign dataset plan.toml -o pressed --shards 1 --workers 1 --json",
-    "cmpdesign dataset pressed --check",
+    "cmpdesign dataset published --check",
 )
 
 
