@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import numbering as native
-from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.affine_maps import LIMITS as MAP_LIMITS
 from extractor.localmap.affine_maps import AffineMapLimits
-from extractor.numbering.lattice_walk import Numbering
+from extractor.numbering.registration import Numbering
 
 AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend; chosen
 # in edges, between a marker's place by its gridlines and a correct initial place; chosen
@@ -56,7 +55,19 @@ class InitialMarkers(NamedTuple):
     is_intact: NDArray[np.bool_]
 
 
-def merge_corners(cells: Cells, numbering: Numbering, lattice: Lattice) -> InitialMarkers:
+class MeasuredCells(NamedTuple):
+    """The cells of an image with their measured triangles.
+
+    Attributes:
+        center_px: (N, 2) float64.
+        corner_px: (N, 3, 2) float64, clockwise in the image; NaN where no triangle is measured.
+    """
+
+    center_px: NDArray[np.float64]
+    corner_px: NDArray[np.float64]
+
+
+def merge_corners(cells: MeasuredCells, numbering: Numbering, lattice: Lattice) -> InitialMarkers:
     """Merge the corners at each marker (eq. 4: at most one red, green and blue).
 
     A cell's corners are those of its triangle where the triangle agrees with the prediction by the cell's neighbours,

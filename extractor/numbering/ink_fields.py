@@ -1,0 +1,113 @@
+"""Inks by the lattice: the colors of the three classes (q - r) mod 3 are smooth fields over a part.
+
+Open is only which field is which ink: the naming. It is decided once an image by the fields' shares of the light in each
+channel, compared with the palette's. A hue is not asked for: colored light may move all hues, and order the fields all the
+same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor._native import numbering as native
+from extractor.image.pyramid import PyramidLevel
+from extractor.image.response import light_of_values
+from extractor.numbering.lattice_walk import WalkedCells
+
+LEAST_PALETTE_SHARE = 0.02  # of the light of an ink in a channel; chosen
+
+
+class InkFieldLimits(NamedTuple):
+    """Limits of the fields.
+
+    Attributes:
+        sample_radius: in edges, over which a cell's color is averaged. Chosen.
+        place_softening: in squared edges, added to the squared distance of a cell from a down-cell whose place it
+            predicts. Chosen.
+        place_reach2: squared edges; cells farther away predict no place. Derived: two steps.
+        residual_scale: in median residuals, at which a cell has half of its weight in the fit of a field. Chosen.
+        least_share: of the strongest field, the least of another one, to take its logarithm. Chosen.
+        least_scatter: of a field's light, the least scatter of cells. Chosen.
+        robust_rounds: fits of a field. Chosen.
+        quadratic_cells, linear_cells: of a field, from which on its degree is 2 or 1. Derived: three cells for each
+            coefficient.
+    """
+
+    sample_radius: float = 0.13
+    place_softening: float = 0.1
+    place_reach2: float = 2.5
+    residual_scale: float = 2.0
+    least_share: float = 0.02
+    least_scatter: float = 0.15
+    robust_rounds: int = 4
+    quadratic_cells: int = 18
+    linear_cells: int = 9
+
+
+LIMITS = InkFieldLimits()
+
+
+@dataclass(frozen=True, eq=False)
+class InkFields:
+    """The colors around one part.
+
+    Attributes:
+        shares: (3, 3) float64, the mean log of each class's share of the light in each channel (B, G, R).
+        odds: (N, 3) float64, the log likelihoods of each cell of the image for the three classes, at most 0.
+        down_axial: (D, 2) int32, the part's down-cells: the black ones and the white one.
+        down_px: (D, 2) float64, their places.
+        whiteness: (D,) float64, their light over the black around, relative to the strongest inks there; NaN outside
+            the image.
+    """
+
+    shares: NDArray[np.float64]
+    odds: NDArray[np.float64]
+    down_axial: NDArray[np.int32]
+    down_px: NDArray[np.float64]
+    whiteness: NDArray[np.float64]
+
+
+class Palette:
+    """The light of a layout's inks.
+
+    Args:
+        colors: name -> "#rrggbb".
+    """
+
+    def __init__(self, colors: dict[str, str]) -> None:
+        light = np.asarray(light_of_values("srgb"), np.float64)
+        inks = np.array(
+            [[light[int(colors[ink][i : i + 2], 16)] for i in (5, 3, 1)] for ink in ("red", "green", "blue")]
+        )
+        inks = np.maximum(inks, LEAST_PALETTE_SHARE * inks.max())
+        self._shares = inks / inks.sum(axis=0)  # (3, 3) of each ink in each channel
+
+    def naming(self, shares: NDArray[np.float64], other_side: bool = False) -> NDArray[np.float64]:
+        """(3,) float64, how well class k + t is ink k, for t = 0, 1, 2: mean log likelihoods, summed over channels.
+
+        Args:
+            shares: of ``InkFields``.
+            other_side: of the pattern seen from its other side, in whose frame class k is class -k.
+        """
+        inks = np.arange(3)
+        return np.array(
+            [
+                float((self._shares * shares[((-1 if other_side else 1) * (inks - t)) % 3]).sum())
+                for t in range(3)
+            ]
+        )
+
+    @cached_property
+    def swapped(self) -> NDArray[np.float64]:
+        """The shares with red and blue channels swapped."""
+        return self._shares[:, ::-1]
+
+
+def ink_fields(view: PyramidLevel, cells: WalkedCells, part: int) -> InkFields:
+    """The colors around a part of the walked cells, in the image at the scale of recognition."""
+    return InkFields(*native.ink_fields(view, cells, part, LIMITS))
