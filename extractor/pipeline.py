@@ -33,7 +33,7 @@ from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import Reference
 from extractor.layout.topology import topology_of
 from extractor.numbering.ink_fields import Palette
-from extractor.numbering.lattice_walk import Walk, count_holes, walk_cells
+from extractor.numbering.lattice_walk import Walk, cell_light, count_holes, walk_cells
 from extractor.numbering.marker_places import InitialMarkers, MeasuredCells, merge_corners
 from extractor.numbering.registration import Numbering, Refusal, Registration
 from extractor.presets import PRESETS, Preset
@@ -54,10 +54,11 @@ CHANNELS: tuple[Channels, ...] = ("bgr", "rgb")
 
 
 class FoundCells(NamedTuple):
-    """The cells of an image, their links, and their places in the lattice."""
+    """The cells of an image, their links, light, and places in the lattice."""
 
     cells: Cells
     mesh: CellMesh
+    light: NDArray[np.float64]
     walk: Walk
 
     @property
@@ -217,7 +218,7 @@ class Extractor:
             quality = measure_quality_without_numbers(pyramid.level(1), found.edge_px)
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
-        (cells, mesh, _), numbering = found
+        (cells, mesh, _, _), numbering = found
         corners = fit_edges(pyramid.level(1), without_swelling(cells, mesh), numbering.cell >= 0)
         corners = stages.record("triangles", corners)
         measured = MeasuredCells(cells.center_px, corners)
@@ -276,8 +277,7 @@ class Extractor:
             found = self._find_cells(view, stages)
             if found is None:
                 continue
-            cells, mesh, walk = found
-            numbering = self._registration.number(view, cells, mesh, walk)
+            numbering = self._registration.number(view, *found)
             stages.record("number", numbering)
             if not isinstance(numbering, Refusal):
                 return NumberedCells(found, numbering)
@@ -302,8 +302,9 @@ class Extractor:
     def _find_cells_with(self, view: PyramidLevel, effort: Effort, stages: Stages) -> FoundCells:
         cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort))
         mesh = stages.record("mesh", build_cell_mesh(cells))
-        walk = stages.record("walk", walk_cells(mesh))
-        return FoundCells(cells, mesh, walk)
+        light = stages.record("light", cell_light(view, cells, mesh))
+        walk = stages.record("walk", walk_cells(mesh, light))
+        return FoundCells(cells, mesh, light, walk)
 
     def _largest_edge_px(self, view: PyramidLevel) -> float:
         """The edges of this pattern where it fills the image, px at full scale."""
@@ -312,10 +313,9 @@ class Extractor:
 
     def _is_whole(self, found: FoundCells, view: PyramidLevel) -> bool:
         """Whether the cells of an image are all found, as far as the cells themselves show it."""
-        cells, mesh, walk = found
         if found.count < self._registration.min_cells:
             return False
-        if count_holes(walk) > max(MAX_HOLE_SHARE * found.count, MIN_HOLES):
+        if count_holes(found.walk) > max(MAX_HOLE_SHARE * found.count, MIN_HOLES):
             return False
         return True
 

@@ -1,8 +1,7 @@
 """Stage 6: the cell mesh links the cells that share a corner, by the cells' triangles alone (eqs. 4 and 5).
 
-Where a cell's corner i is the corner j of a neighbour, the neighbour's center lies at the cell's center + corner i -
-corner j. A link is mutual: each cell finds the other one near to the place where its own triangle expects it. No color
-decides.
+A link is mutual: each of two cells has a corner that is the nearest to a corner of the other. Their shapes may differ; the
+directions to each other need only agree roughly with their own triangles. No color decides.
 """
 
 from __future__ import annotations
@@ -21,15 +20,18 @@ class CellMeshLimits(NamedTuple):
     """Limits of the mesh.
 
     Attributes:
-        first_tolerance: L of eq. 5, in edges, between a neighbour and its expected place, while the swelling is
-            unknown; the next cell is an edge away. Chosen.
+        first_tolerance: L of eq. 5, in edges of the smaller cell, between two corners while the swelling is unknown; the
+            next corner is an edge away. Chosen.
         tolerance: the same with the swelling. Chosen.
-        swelling_rounds: estimates of the swelling. Chosen.
+        direction_tolerance: in edges, between a neighbour's center and where a cell's own triangle expects it. Chosen.
+        min_swelling, max_swelling: of a whole image. Chosen.
     """
 
-    first_tolerance: float = 0.45
-    tolerance: float = 0.33
-    swelling_rounds: int = 2
+    first_tolerance: float = 0.65
+    tolerance: float = 0.4
+    direction_tolerance: float = 0.7
+    min_swelling: float = 0.6
+    max_swelling: float = 1.6
 
 
 LIMITS = CellMeshLimits()
@@ -41,7 +43,7 @@ class CellLinks(NamedTuple):
     Attributes:
         neighbours: (N, 6) int32, the linked cells, or -1.
         back: (N, 6) int8, the step by which each of them leads back, or -1.
-        misfit: (N, 6) float64, in edges, between expected places and cells.
+        misfit: (N, 6) float64, in edges, between the corners.
     """
 
     neighbours: NDArray[np.int32]

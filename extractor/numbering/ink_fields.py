@@ -8,7 +8,6 @@ same.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,9 @@ from extractor._native import numbering as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.image.response import light_of_values
 from extractor.numbering.lattice_walk import WalkedCells
+from extractor.result import Reason
 
+SWAPPED_LEAD = 0.3  # of the naming, between a mirrored view and swapped channels; chosen
 LEAST_PALETTE_SHARE = 0.02  # of the light of an ink in a channel; chosen
 
 
@@ -26,19 +27,17 @@ class InkFieldLimits(NamedTuple):
     """Limits of the fields.
 
     Attributes:
-        sample_radius: in edges, over which a cell's color is averaged. Chosen.
         place_softening: in squared edges, added to the squared distance of a cell from a down-cell whose place it
             predicts. Chosen.
         place_reach2: squared edges; cells farther away predict no place. Derived: two steps.
         residual_scale: in median residuals, at which a cell has half of its weight in the fit of a field. Chosen.
         least_share: of the strongest field, the least of another one, to take its logarithm. Chosen.
         least_scatter: of a field's light, the least scatter of cells. Chosen.
-        robust_rounds: fits of a field. Chosen.
+        robust_rounds: fits of a field, the first ones of lower degrees. Chosen.
         quadratic_cells, linear_cells: of a field, from which on its degree is 2 or 1. Derived: three cells for each
             coefficient.
     """
 
-    sample_radius: float = 0.13
     place_softening: float = 0.1
     place_reach2: float = 2.5
     residual_scale: float = 2.0
@@ -102,12 +101,16 @@ class Palette:
             ]
         )
 
-    @cached_property
-    def swapped(self) -> NDArray[np.float64]:
-        """The shares with red and blue channels swapped."""
-        return self._shares[:, ::-1]
+    def other_side_reason(self, shares: NDArray[np.float64]) -> Reason:
+        """Why the inks are in the order of another side than stated: by the palette, or by it with swapped channels."""
+        as_is = self.naming(shares, other_side=True).max()
+        swapped = self.naming(shares[:, ::-1]).max()
+        if abs(as_is - swapped) < SWAPPED_LEAD:
+            return Reason.OTHER_SIDE
+        return Reason.MIRRORED if as_is > swapped else Reason.SWAPPED_CHANNELS
 
 
-def ink_fields(view: PyramidLevel, cells: WalkedCells, part: int) -> InkFields:
-    """The colors around a part of the walked cells, in the image at the scale of recognition."""
-    return InkFields(*native.ink_fields(view, cells, part, LIMITS))
+def ink_fields(view: PyramidLevel, cells: WalkedCells, light: NDArray[np.float64], part: int) -> InkFields:
+    """The colors around a part of the walked cells, in the image at the scale of recognition; light (N, 3) of the
+    cells."""
+    return InkFields(*native.ink_fields(view, cells, light, part, LIMITS))

@@ -16,18 +16,34 @@ from extractor._native import numbering as native
 from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.cells.triangle_fit import without_swelling
+from extractor.image.pyramid import PyramidLevel
 
 MIN_HOLE_NEIGHBOURS = 3  # of a free place; beside a straight rim there are two. Derived
+
+
+class LinkInkLimits(NamedTuple):
+    """Limits of inks at links (eq. 4: at most one cell of each ink at a marker).
+
+    Attributes:
+        likeness: of the difference between a neighbour and others of its class; it is of another class if it differs
+            less from a cell of that. Chosen.
+        least_difference: of the light of cells, between inks that can be told apart. Chosen.
+    """
+
+    likeness: float = 0.5
+    least_difference: float = 0.25
 
 
 class WalkLimits(NamedTuple):
     """Limits of a walk.
 
     Attributes:
-        max_rounds: walks, each without the cells contradicted before. Measured: rule "contradictions".
+        max_rounds: walks, each without the cells contradicted before. Chosen.
+        inks: of inks at links.
     """
 
     max_rounds: int = 6
+    inks: LinkInkLimits = LinkInkLimits()
 
 
 LIMITS = WalkLimits()
@@ -73,9 +89,23 @@ class WalkedCells(NamedTuple):
     part: NDArray[np.int32]
 
 
-def walk_cells(mesh: CellMesh) -> Walk:
-    """Walk over all linked cells."""
-    axial, first, part, contradictions = native.walk_cells(mesh.links, LIMITS)
+def cell_light(view: PyramidLevel, cells: Cells, mesh: CellMesh) -> NDArray[np.float64]:
+    """(N, 3) float64, the light of cells over the local black (B, G, R, units of 1/255); NaN where unknown.
+
+    Args:
+        view: the image at the scale of recognition.
+        cells, mesh: the cells and their links.
+    """
+    return np.asarray(native.cell_light(view, cells.center_px, without_swelling(cells, mesh)))
+
+
+def walk_cells(mesh: CellMesh, light: NDArray[np.float64]) -> Walk:
+    """Walk over all linked cells, along links that the cells' light (N, 3) does not contradict."""
+    bad = native.contradicted_links(mesh.links, light, LIMITS.inks)
+    links = mesh.links._replace(
+        neighbours=np.where(bad, -1, mesh.links.neighbours), back=np.where(bad, np.int8(-1), mesh.links.back)
+    )
+    axial, first, part, contradictions = native.walk_cells(links, LIMITS)
     return Walk(axial, first, part, int(contradictions))
 
 

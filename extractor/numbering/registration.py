@@ -28,7 +28,11 @@ MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; 
 MAX_PARTS = 4  # that are tried for the origin, the largest; chosen
 NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
 SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
-LEAD = 6.0  # log odds of the best motion over the second best; chosen
+MAX_TIED = 24  # motions between which the other parts may decide; chosen, for time
+LEAD = 8.0  # log odds of the best motion over the second best; chosen
+JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
+ODD_INK = -8.0  # log likelihood of a cell's class below which another class ...
+FITTING_INK = -2.0  # ... above this one says that the cell is on a wrong place; chosen
 
 
 class WitnessLimits(NamedTuple):
@@ -66,17 +70,17 @@ class WhiteLimits(NamedTuple):
 
 
 class MapPrior(NamedTuple):
-    """The prior of local maps; lengths in edges.
+    """The prior of local maps. Lengths are in edges; a term of degree k has the unit edge per edge^k.
 
     Attributes:
         noise: standard deviation of a cell's center. Chosen.
-        curvature: of half a second derivative, per edge. Chosen.
-        unseen: of the terms beyond, of the cube of the distance from the nearest known cell. Chosen.
+        quadratic: of the terms of degree 2. Chosen.
+        cubic: of the terms of degree 3. Chosen.
     """
 
-    noise: float = 0.06
-    curvature: float = 0.04
-    unseen: float = 0.012
+    noise: float = 0.08
+    quadratic: float = 0.05
+    cubic: float = 0.01
 
 
 class AttachmentLimits(NamedTuple):
@@ -91,18 +95,18 @@ class AttachmentLimits(NamedTuple):
             the lattice.
         max_corner_misfit: in edges, between a cell's corners and those of the map; a triangle that points the other way
             has 1.15. Chosen.
-        max_misfit: mean log likelihood of a cell of an accepted part. Chosen.
+        max_misfit: least log likelihood of an accepted part, times the root of its judged cells. Chosen.
         outside_odds: log likelihood of a cell that lies outside, on a taken place, or nowhere near. Chosen.
         margin: lead of the best motion. Chosen.
     """
 
     prior: MapPrior = MapPrior()
-    known_cells: int = 12
+    known_cells: int = 24
     judged_cells: int = 16
     max_rounds: int = 6
     reach: float = 1.8
     max_corner_misfit: float = 0.6
-    max_misfit: float = 4.5
+    max_misfit: float = 8.0
     outside_odds: float = -12.5
     margin: float = 6.0
 
@@ -172,6 +176,19 @@ class Refusal:
     fields: InkFields | None = None
 
 
+class _WalkedImage(NamedTuple):
+    """The cells of an image, their links, light, and places in the lattice."""
+
+    view: PyramidLevel
+    cells: Cells
+    mesh: CellMesh
+    light: NDArray[np.float64]
+    walk: Walk
+
+    def seen_from(self, mirrored: bool) -> WalkedCells:
+        return seen_from(self.cells, self.mesh, self.walk, mirrored)
+
+
 class _Placed(NamedTuple):
     """A part with its motions."""
 
@@ -207,79 +224,101 @@ class Registration:
         self._layout = RegisteredLayout(lattice.axial, lattice.cell_lookup)
         self.min_cells = max(MIN_LAYOUT_SHARE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
 
-    def number(self, view: PyramidLevel, cells: Cells, mesh: CellMesh, walk: Walk) -> Numbering | Refusal:
+    def number(
+        self, view: PyramidLevel, cells: Cells, mesh: CellMesh, light: NDArray[np.float64], walk: Walk
+    ) -> Numbering | Refusal:
         """The numbers of the cells, or the reason why there are none.
 
         Args:
             view: the image at the scale of recognition.
-            cells, mesh, walk: the cells of the image, their links, and their places in the lattice.
+            cells, mesh, light, walk: the cells of the image, their links, light, and places in the lattice.
         """
         sizes = walk.sizes
         large = [int(p) for p in np.argsort(-sizes, kind="stable")[:MAX_PARTS] if sizes[p] >= self.min_cells]
         if not large:
             return Refusal(Reason.NO_PATTERN)
-        refusal: Refusal | None = None
-        for n, part in enumerate(large):
-            placed = self._register(view, cells, mesh, walk, part)
-            if isinstance(placed, Refusal):
-                refusal = refusal or placed
-            elif placed.is_certain:
-                return self._attach(view, cells, mesh, walk, placed, large[:n] + large[n + 1 :])
-            else:
-                refusal = refusal or Refusal(_uncertain_reason(placed), placed.fields)
-        assert refusal is not None
-        return refusal
+        image = _WalkedImage(view, cells, mesh, light, walk)
+        found = [self._register(image, part) for part in large]
+        placed = [one for one in found if isinstance(one, _Placed)]
+        certain = next((one for one in placed if one.is_certain), None)
+        if certain is None and placed:
+            certain = self._with_all_parts(image, placed[0])
+        if certain is not None:
+            return self._number_with(image, certain, [part for part in large if part != certain.part])
+        return found[0] if isinstance(found[0], Refusal) else Refusal(_uncertain_reason(found[0]), found[0].fields)
 
-    def _register(
-        self, view: PyramidLevel, cells: Cells, mesh: CellMesh, walk: Walk, part: int
-    ) -> _Placed | Refusal:
+    def _register(self, image: _WalkedImage, part: int) -> _Placed | Refusal:
         """A part with its motions, or the reason why its side is refused."""
         mirrored = bool(self._mirrored)
-        walked = seen_from(cells, mesh, walk, mirrored)
-        fields = ink_fields(view, walked, part)
+        walked = image.seen_from(mirrored)
+        fields = ink_fields(image.view, walked, image.light, part)
         own, other = self._palette.naming(fields.shares), self._palette.naming(fields.shares, other_side=True)
         lead = float(other.max() - own.max())
         if self._mirrored is None and lead > 0.0:
             mirrored = not mirrored
-            walked = seen_from(cells, mesh, walk, mirrored)
-            fields = ink_fields(view, walked, part)
+            walked = image.seen_from(mirrored)
+            fields = ink_fields(image.view, walked, image.light, part)
             own = self._palette.naming(fields.shares)
-        if lead > SIDE_LEAD and self._mirrored is not None or self._mirrored is None and abs(lead) < SIDE_LEAD:
+        if self._mirrored is None and abs(lead) < SIDE_LEAD:
             return Refusal(Reason.OTHER_SIDE, fields)
+        if self._mirrored is not None and lead > SIDE_LEAD:
+            return Refusal(self._palette.other_side_reason(fields.shares), fields)
         naming = NAMING_WEIGHT * (own - own.max())
-        white = white_odds(fields.whiteness)
         axial = np.ascontiguousarray(walked.axial[walked.part == part])
+        white = white_odds(fields.whiteness)
         found = native.register_part(axial, naming, fields.down_axial, white, self._layout, WITNESSES)
         return _Placed(part, walked, fields, Motions(*found), mirrored)
 
-    def _attach(
-        self,
-        view: PyramidLevel,
-        cells: Cells,
-        mesh: CellMesh,
-        walk: Walk,
-        placed: _Placed,
-        others: list[int],
-    ) -> Numbering | Refusal:
-        """The numbers of all cells, by the part that is placed."""
+    def _with_all_parts(self, image: _WalkedImage, placed: _Placed) -> _Placed | None:
+        """The part with a certain motion, if the other parts decide between its best motions; None if they do not.
+
+        Under each motion the other parts are registered; a cell without a place counts as one outside the layout.
+        """
+        motions = placed.motions
+        tied = np.flatnonzero(motions.score > motions.score[:1].max(initial=-np.inf) - LEAD)
+        if not 0 < len(tied) <= MAX_TIED:
+            return None
+        counts = np.array([np.count_nonzero(self._placed_cells(placed, k) >= 0) for k in tied])
+        score = motions.score[tied] + WITNESSES.outside_weight * counts
+        order = np.argsort(-score, kind="stable")
+        chosen = Motions(*(values[tied[order]] for values in motions))._replace(score=score[order])
+        decided = placed._replace(motions=chosen)
+        return decided if decided.lead >= JOINT_LEAD else None
+
+    def _placed_cells(self, placed: _Placed, number: int) -> NDArray[np.int32]:
+        """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
         own = placed.cells.part == placed.part
         axial = np.ascontiguousarray(placed.cells.axial[own])
-        turn, dq, dr = (int(v) for v in placed.motions.motion[0])
+        turn, dq, dr = (int(v) for v in placed.motions.motion[number])
         cell = np.full(len(own), -1, np.int32)
         cell[own] = native.moved_cells(axial, turn, dq, dr, self._layout.cell_lookup)
         shift = _class_shift(self._lattice, cell[own], axial)
         odds = np.ascontiguousarray(placed.fields.odds[:, (np.arange(3) - shift) % 3])
-        cell = native.attach_parts(
-            placed.cells, cell, odds, self._lattice.layout_cells, *self._layout, ATTACHMENT
-        )
+        cell = native.attach_parts(placed.cells, cell, odds, self._lattice.layout_cells, *self._layout, ATTACHMENT)
+        odd = is_odd(odds, self._lattice.ink[np.maximum(cell, 0)].astype(np.intp) - 1)
+        return np.where(odd, -1, cell).astype(np.int32)
+
+    def _number_with(self, image: _WalkedImage, placed: _Placed, others: list[int]) -> Numbering | Refusal:
+        """The numbers of all cells, by the part whose motion is certain."""
+        cell = self._placed_cells(placed, 0)
         for part in others:
-            if (cell[walk.part == part] >= 0).any():
+            if (cell[image.walk.part == part] >= 0).any():
                 continue
-            second = self._register(view, cells, mesh, walk, part)
-            if not isinstance(second, Refusal) and second.is_certain and second.motions.white[0] > 0.0:
+            second = self._register(image, part)
+            if isinstance(second, _Placed) and second.is_certain and second.motions.white[0] > 0.0:
                 return Refusal(Reason.SEVERAL_PADS, placed.fields)
         origin = Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
         return Numbering(cell, placed.mirrored, origin, placed.lead, placed.fields)
+
+
+def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """(N,) bool, the cells whose color is not that of their own class (N,), modulo 3, but that of another class.
+
+    Args:
+        odds: (N, 3), the log likelihoods of the classes.
+    """
+    mine = odds[np.arange(len(odds)), own % 3]
+    return (mine < ODD_INK) & (odds.max(axis=1) > FITTING_INK)
 
 
 def white_odds(whiteness: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,64 +10,148 @@ namespace cmp::cells {
 
 namespace {
 
-// The steps of N cells to the cells nearest to the places where neighbours are expected.
-class Steps {
- public:
-  Steps(View<const double, 2> center, View<const double, 3> corner)
-      : center_(center),
-        corner_(corner),
-        grid_(numeric::bucket_grid(center)),
-        to_({center.size(), STEPS}),
-        misfit_({center.size(), STEPS}),
-        length_({center.size(), STEPS}) {}
+constexpr int CORNERS = 3;
+constexpr Index NEAREST = 5;  // corners that are looked at; three cells meet at a marker
 
-  // Looks the neighbours up, with sides divided by the swelling; farther ones than the tolerance are none.
-  void find(double swelling, double tolerance) {
-    Array<std::int32_t, 1> index({1});
-    Array<double, 1> square({1});
-    for (Index i = 0; i < center_.size(); ++i)
-      for (Index j = 0; j < STEPS; ++j) {
-        const auto [a, b] = STEP_CORNERS[j];
-        const double x = (corner_(i, a, 0) - corner_(i, b, 0)) / swelling;
-        const double y = (corner_(i, a, 1) - corner_(i, b, 1)) / swelling;
-        const double length = std::sqrt(x * x + y * y);
-        numeric::fill_nearest_points(grid_, center_(i, 0) + x, center_(i, 1) + y, index, square);
-        const double misfit = std::sqrt(square[0]) / length;
-        to_(i, j) = misfit < tolerance && index[0] != i ? index[0] : -1;
-        misfit_(i, j) = misfit;
-        length_(i, j) = length;
+struct Vector {
+  double x, y;
+
+  double length() const { return std::sqrt(x * x + y * y); }
+  friend Vector operator-(Vector a, Vector b) { return {a.x - b.x, a.y - b.y}; }
+};
+
+// The number of the step by which a neighbour shares corner i, where the neighbour's place is that of corner j.
+constexpr Index step_of(int i, int j) {
+  for (Index k = 0; k < STEPS; ++k)
+    if (STEP_CORNERS[k][0] == i && STEP_CORNERS[k][1] == j) return k;
+  return -1;
+}
+
+// Two corners that may be one, and the step between their cells.
+struct Contact {
+  std::int32_t from, to;
+  std::int8_t step, back;
+};
+
+// The triangles of N cells, about their centers.
+class Triangles {
+ public:
+  Triangles(View<const double, 2> center, View<const double, 3> corner)
+      : center_(center), corner_(corner.shape()), edge_({center.size()}), points_({CORNERS * center.size(), 2}) {
+    for (Index i = 0; i < center.size(); ++i) {
+      for (int k = 0; k < CORNERS; ++k)
+        for (int axis = 0; axis < 2; ++axis) {
+          corner_(i, k, axis) = corner(i, k, axis) - center(i, axis);
+          points_(CORNERS * i + k, axis) = corner(i, k, axis);
+        }
+      const Vector u = at(i, 1) - at(i, 0), v = at(i, 2) - at(i, 0);
+      edge_[i] = std::sqrt(std::abs(u.x * v.y - u.y * v.x) * 2.0 / std::sqrt(3.0));
+    }
+  }
+
+  // The contacts of corners that are nearer than the tolerance, in edges.
+  std::vector<Contact> contacts(double tolerance, double direction_tolerance) const {
+    const auto grid = numeric::bucket_grid(points_);
+    std::vector<Contact> out;
+    Array<std::int32_t, 1> index({NEAREST});
+    Array<double, 1> square({NEAREST});
+    for (Index point = 0; point < points_.size(); ++point) {
+      const Index i = point / CORNERS;
+      const Index found = numeric::fill_nearest_points(grid, points_(point, 0), points_(point, 1), index, square);
+      for (Index n = 0; n < found; ++n) {
+        const Index other = index[n] / CORNERS;
+        const double reach = tolerance * std::min(edge_[i], edge_[other]);
+        if (other != i && square[n] < reach * reach)
+          add_contact(out, i, static_cast<int>(point % CORNERS), other, index[n] % CORNERS, direction_tolerance);
       }
+    }
+    return out;
   }
-  // The step by which the neighbour at step j of cell i leads back; -1 if there is none.
-  int back(Index i, Index j) const {
-    const std::int32_t other = to_(i, j);
-    if (other < 0) return -1;
-    for (int k = 0; k < STEPS; ++k)
-      if (to_(other, k) == i) return k;
-    return -1;
+  // The distance between the corners of a contact, in edges of the smaller cell, of triangles without a swelling.
+  double misfit(const Contact& contact, double swelling) const {
+    const Vector own = at(contact.from, STEP_CORNERS[contact.step][0]), way = way_of(contact);
+    const Vector other = at(contact.to, STEP_CORNERS[contact.back][0]);
+    const Vector gap{way.x - (own.x - other.x) / swelling, way.y - (own.y - other.y) / swelling};
+    return gap.length() / std::min(edge_[contact.from], edge_[contact.to]);
   }
-  // The median of expected distances over the neighbours' true distances.
-  double relative_length() const {
-    std::vector<double> ratios;
-    for (Index i = 0; i < center_.size(); ++i)
-      for (Index j = 0; j < STEPS; ++j) {
-        if (back(i, j) < 0) continue;
-        const double x = center_(to_(i, j), 0) - center_(i, 0), y = center_(to_(i, j), 1) - center_(i, 1);
-        ratios.push_back(length_(i, j) / std::max(std::sqrt(x * x + y * y), 1e-9));
-      }
-    if (ratios.empty()) return 1.0;
-    return numeric::median_of_many(View<double, 1>(ratios.data(), {static_cast<Index>(ratios.size())}));
+  // The distance of two cells at which their triangles would just meet, over their distance.
+  double swelling(const Contact& contact) const {
+    const Vector met = at(contact.from, STEP_CORNERS[contact.step][0]) - at(contact.to, STEP_CORNERS[contact.back][0]);
+    const Vector way = way_of(contact);
+    return (met.x * way.x + met.y * way.y) / std::max(way.x * way.x + way.y * way.y, 1e-12);
   }
-  std::int32_t to(Index i, Index j) const { return to_(i, j); }
-  double misfit(Index i, Index j) const { return misfit_(i, j); }
 
  private:
+  Vector at(Index i, Index k) const { return {corner_(i, k, 0), corner_(i, k, 1)}; }
+  Vector way_of(const Contact& c) const {
+    return {center_(c.to, 0) - center_(c.from, 0), center_(c.to, 1) - center_(c.from, 1)};
+  }
+  // How far the neighbour lies from where the cell's own triangle expects it, in edges.
+  double direction_misfit(Index i, Index shared, Index from, Vector way) const {
+    return (way - (at(i, shared) - at(i, from))).length() / edge_[i];
+  }
+  void add_contact(std::vector<Contact>& out, Index i, int own, Index other, Index shared,
+                   double direction_tolerance) const {
+    const Vector way{center_(other, 0) - center_(i, 0), center_(other, 1) - center_(i, 1)};
+    const int a = (own + 1) % CORNERS, b = (own + 2) % CORNERS;
+    const double at_a = direction_misfit(i, own, a, way), at_b = direction_misfit(i, own, b, way);
+    const int place = at_a < at_b ? a : b;
+    // the neighbour's corner `shared` is the lattice's corner `place`; the others follow in the same order
+    const auto back = static_cast<int>((shared + own - place + CORNERS) % CORNERS);
+    const double reverse = direction_misfit(other, shared, back, {-way.x, -way.y});
+    if (std::max(std::min(at_a, at_b), reverse) > direction_tolerance) return;
+    out.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(other),
+                   static_cast<std::int8_t>(step_of(own, place)),
+                   static_cast<std::int8_t>(step_of(static_cast<int>(shared), back))});
+  }
+
   View<const double, 2> center_;
-  View<const double, 3> corner_;
-  numeric::BucketGrid grid_;
-  Array<std::int32_t, 2> to_;
-  Array<double, 2> misfit_, length_;
+  Array<double, 3> corner_;
+  Array<double, 1> edge_;
+  Array<double, 2> points_;
 };
+
+// The best contact at each step of each cell (N, 6), or -1; only where both cells agree.
+class MutualContacts {
+ public:
+  MutualContacts(const Triangles& triangles, const std::vector<Contact>& contacts, Index cells, double swelling,
+                 double tolerance)
+      : best_({cells, STEPS}, -1), misfit_({cells, STEPS}, tolerance), contacts_(contacts) {
+    for (std::size_t n = 0; n < contacts.size(); ++n) {
+      const Contact& one = contacts[n];
+      const double misfit = triangles.misfit(one, swelling);
+      if (misfit >= misfit_(one.from, one.step)) continue;
+      misfit_(one.from, one.step) = misfit;
+      best_(one.from, one.step) = static_cast<std::int32_t>(n);
+    }
+  }
+  // The contact at a step; null for none.
+  const Contact* at(Index i, Index step) const {
+    const std::int32_t n = best_(i, step);
+    if (n < 0) return nullptr;
+    const Contact& one = contacts_[static_cast<std::size_t>(n)];
+    const std::int32_t other = best_(one.to, one.back);
+    if (other < 0) return nullptr;
+    const Contact& reverse = contacts_[static_cast<std::size_t>(other)];
+    return reverse.to == i && reverse.back == step ? &one : nullptr;
+  }
+  double misfit(Index i, Index step) const { return misfit_(i, step); }
+
+ private:
+  Array<std::int32_t, 2> best_;
+  Array<double, 2> misfit_;
+  const std::vector<Contact>& contacts_;
+};
+
+// The median swelling at mutual contacts; 1 without any.
+double swelling_of(const Triangles& triangles, const MutualContacts& contacts, Index cells) {
+  std::vector<double> ratios;
+  for (Index i = 0; i < cells; ++i)
+    for (Index k = 0; k < STEPS; ++k)
+      if (const Contact* one = contacts.at(i, k)) ratios.push_back(triangles.swelling(*one));
+  if (ratios.empty()) return 1.0;
+  return numeric::median_of_many(View<double, 1>(ratios.data(), {static_cast<Index>(ratios.size())}));
+}
 
 }  // namespace
 
@@ -78,19 +162,18 @@ CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
   Array<double, 2> misfit({count, STEPS}, 0.0);
   double swelling = 1.0;
   if (count > 1) {
-    Steps steps(center, corner);
-    for (std::int64_t round = 0; round < limits.swelling_rounds; ++round) {
-      steps.find(swelling, limits.first_tolerance);
-      swelling *= steps.relative_length();
-    }
-    steps.find(swelling, limits.tolerance);
+    const Triangles triangles(center, corner);
+    const auto contacts = triangles.contacts(limits.first_tolerance, limits.direction_tolerance);
+    const MutualContacts first(triangles, contacts, count, 1.0, limits.first_tolerance);
+    swelling = std::min(std::max(swelling_of(triangles, first, count), limits.min_swelling), limits.max_swelling);
+    const MutualContacts mutual(triangles, contacts, count, swelling, limits.tolerance);
     for (Index i = 0; i < count; ++i)
-      for (Index j = 0; j < STEPS; ++j) {
-        const int other = steps.back(i, j);
-        if (other < 0) continue;
-        neighbours(i, j) = steps.to(i, j);
-        back(i, j) = static_cast<std::int8_t>(other);
-        misfit(i, j) = 0.5 * (steps.misfit(i, j) + steps.misfit(steps.to(i, j), other));
+      for (Index k = 0; k < STEPS; ++k) {
+        const Contact* one = mutual.at(i, k);
+        if (one == nullptr) continue;
+        neighbours(i, k) = one->to;
+        back(i, k) = one->back;
+        misfit(i, k) = mutual.misfit(i, k);
       }
   }
   return {std::move(neighbours), std::move(back), std::move(misfit), swelling};

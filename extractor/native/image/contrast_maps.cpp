@@ -25,12 +25,23 @@ constexpr double QUANTILE = 0.3;         // of the differences' sizes
 constexpr double NORMAL_QUANTILE = 0.385;  // the same of a normal distribution
 constexpr double SMOOTHED = 0.375;       // noise after smoothing over noise before
 
-CMP_PART_OF_LOOP void fill_sums(const std::uint8_t* from, Index width, View<std::uint16_t, 1> values,
-                                View<std::uint16_t, 1> sums) {
-  for (Index x = 0; x < width; ++x) values[x + 1] = from[CHANNELS * x];
-  values[0] = values[1];
-  values[width + 1] = values[width];
-  for (Index x = 0; x < width; ++x)
+using Line = View<std::uint16_t, 1>;
+
+// Splits a row of pixels into its channels, with the first and the last value twice.
+CMP_PART_OF_LOOP void split(const std::uint8_t* from, Index width, Line blue, Line green, Line red) {
+  for (Index x = 0; x < width; ++x) {
+    blue[x + 1] = from[CHANNELS * x];
+    green[x + 1] = from[CHANNELS * x + 1];
+    red[x + 1] = from[CHANNELS * x + 2];
+  }
+  for (const Line& line : {blue, green, red}) {
+    line[0] = line[1];
+    line[width + 1] = line[width];
+  }
+}
+
+CMP_PART_OF_LOOP void fill_sums(View<const std::uint16_t, 1> values, Line sums) {
+  for (Index x = 0; x < sums.size(); ++x)
     sums[x] = static_cast<std::uint16_t>(values[x] + 2 * values[x + 1] + values[x + 2]);
 }
 
@@ -52,20 +63,25 @@ CMP_PART_OF_LOOP void fill_mixed(View<const std::uint8_t, 1> blue, View<const st
 // The least and largest value of each tile.
 CMP_PART_OF_LOOP void fill_tile_levels(View<const std::uint8_t, 2> map, Index tile_px, View<float, 2> low,
                                        View<float, 2> high) {
-  for (Index ty = 0; ty < low.size(); ++ty)
-    for (Index tx = 0; tx < low.size(1); ++tx) {
-      std::uint8_t least = 255, most = 0;
-      const Index right = std::min((tx + 1) * tile_px, map.size(1)), bottom = std::min((ty + 1) * tile_px, map.size(0));
-      for (Index y = ty * tile_px; y < bottom; ++y) {
-        const auto row = map[y];
-        for (Index x = tx * tile_px; x < right; ++x) {
-          least = std::min(least, row[x]);
-          most = std::max(most, row[x]);
-        }
+  const Index width = map.size(1);
+  Array<std::uint8_t, 1> least({width}), most({width});
+  const auto least_line = least.view(), most_line = most.view();
+  for (Index ty = 0; ty < low.size(); ++ty) {
+    least_line.fill(255);
+    most_line.fill(0);
+    for (Index y = ty * tile_px; y < std::min((ty + 1) * tile_px, map.size(0)); ++y) {
+      const auto row = map[y];
+      for (Index x = 0; x < width; ++x) {
+        least_line[x] = std::min(least_line[x], row[x]);
+        most_line[x] = std::max(most_line[x], row[x]);
       }
-      low(ty, tx) = least;
-      high(ty, tx) = most;
     }
+    for (Index tx = 0; tx < low.size(1); ++tx) {
+      const Index begin = tx * tile_px, end = std::min(begin + tile_px, width);
+      low(ty, tx) = *std::min_element(least_line.begin() + begin, least_line.begin() + end);
+      high(ty, tx) = *std::max_element(most_line.begin() + begin, most_line.begin() + end);
+    }
+  }
 }
 
 // Replaces each tile by what `combine` makes of it and the tiles around it, one after the other.
@@ -89,18 +105,18 @@ void update_by_neighbours(Array<float, 2>& tiles, Combine combine) {
 Array<std::uint8_t, 3> smoothed_channels(View<const std::uint8_t, 3> image) {
   const Index height = image.size(0), width = image.size(1);
   Array<std::uint8_t, 3> out({CHANNELS, height, width});
-  Array<std::uint16_t, 2> rows({3, width});
-  Array<std::uint16_t, 1> values({width + 2});
-  for (Index c = 0; c < CHANNELS; ++c) {
-    const auto fill = [&](Index y) {
-      fill_sums(&image(std::min(std::max<Index>(y, 0), height - 1), 0, c), width, values, rows[(y + 3) % 3]);
-    };
-    fill(-1);
-    fill(0);
-    for (Index y = 0; y < height; ++y) {
-      fill(y + 1);
-      fill_smoothed_row(rows[(y + 2) % 3], rows[y % 3], rows[(y + 1) % 3], out[c][y]);
-    }
+  Array<std::uint16_t, 3> sums({3, CHANNELS, width});
+  Array<std::uint16_t, 2> lines({CHANNELS, width + 2});
+  const auto fill = [&](Index y) {
+    split(&image(std::min(std::max<Index>(y, 0), height - 1), 0, 0), width, lines[0], lines[1], lines[2]);
+    for (Index c = 0; c < CHANNELS; ++c) fill_sums(lines[c], sums[(y + 3) % 3][c]);
+  };
+  fill(-1);
+  fill(0);
+  for (Index y = 0; y < height; ++y) {
+    fill(y + 1);
+    for (Index c = 0; c < CHANNELS; ++c)
+      fill_smoothed_row(sums[(y + 2) % 3][c], sums[y % 3][c], sums[(y + 1) % 3][c], out[c][y]);
   }
   return out;
 }

@@ -1,4 +1,4 @@
-// A local map from the layout to the image: a polynomial with a prior, and what it says of its own error.
+// A local map from the layout to the image: a polynomial of degree 3 with a prior, and how much it must bend.
 #pragma once
 
 #include <array>
@@ -9,100 +9,116 @@
 
 namespace cmp::localmap {
 
-// The prior of a map; lengths in edges.
+// The prior of a map. Lengths are in edges; a term of degree k has the unit edge per edge^k.
 struct MapPrior {
-  double noise;      // standard deviation of a cell's center
-  double curvature;  // of a second derivative's half, per edge
-  double unseen;     // of the terms beyond: of the cube of the distance from the nearest known cell
+  double noise;      // standard deviation of a point
+  double quadratic;  // of the terms of degree 2
+  double cubic;      // of the terms of degree 3
 
   template <class F>
   static MapPrior read(const F& f) {
-    return {f["noise"], f["curvature"], f["unseen"]};
+    return {f["noise"], f["quadratic"], f["cubic"]};
   }
 };
 
-// A place in the image with its variance per axis, px^2, and the slope there, px per mm.
-struct MappedPoint {
-  double x, y, variance;
-  double xx, xy, yx, yy;  // d x / d x_mm, d x / d y_mm, d y / d x_mm, d y / d y_mm
+// Where coordinates of a map begin, and their units.
+struct MapFrame {
+  double x_mm, y_mm, edge_mm;
+  double x_px, y_px, edge_px;
 };
 
-// A map of degree 2 about a place of the layout.
+// A place in the image, px, and its variance per axis, px^2, by noise and prior.
+struct MappedPoint {
+  double x, y, variance;
+};
+
 class LocalMap {
  public:
-  LocalMap(double x_mm, double y_mm, double size_mm, const MapPrior& prior)
-      : x_mm_(x_mm), y_mm_(y_mm), size_mm_(size_mm), prior_(prior) {}
+  LocalMap(const MapFrame& frame, const MapPrior& prior) : frame_(frame), prior_(prior) {}
 
   // Adds a known point of the layout and its place in the image.
   void add(double x_mm, double y_mm, double x_px, double y_px) {
-    if (count_ == 0) x_px_ = x_px, y_px_ = y_px;
     const Terms row = terms(x_mm, y_mm);
+    const double x = (x_px - frame_.x_px) / frame_.edge_px, y = (y_px - frame_.y_px) / frame_.edge_px;
     for (Index a = 0; a < TERMS; ++a) {
-      for (Index b = 0; b <= a; ++b) normal_(a, b) += row[a] * row[b];
-      right_(0, a) += row[a] * (x_px - x_px_);
-      right_(1, a) += row[a] * (y_px - y_px_);
+      for (Index b = 0; b <= a; ++b) normal_[a][b] += row[a] * row[b];
+      right_[0][a] += row[a] * x;
+      right_[1][a] += row[a] * y;
     }
+    squares_ += x * x + y * y;
     ++count_;
   }
-  // Solves the equations; false where the points do not determine a linear map.
+  // Fits the map to the points; false where these do not determine a linear map.
   bool solve() {
-    const double ridge = (prior_.noise / prior_.curvature) * (prior_.noise / prior_.curvature);
-    for (Index a = FIRST_CURVED; a < TERMS; ++a) normal_(a, a) += ridge;
     if (count_ < FIRST_CURVED) return false;
-    Array<double, 2> solution({2, TERMS});
-    for (int axis = 0; axis < 2; ++axis)
-      for (Index a = 0; a < TERMS; ++a) solution(axis, a) = right_(axis, a);
-    factor_ = Array<double, 2>(normal_.view());
-    if (!numeric::update_to_cholesky_solution(factor_, solution, TERMS, LEAST_PIVOT)) return false;
-    for (int axis = 0; axis < 2; ++axis)
-      for (Index a = 0; a < TERMS; ++a) solution_[axis][a] = solution(axis, a);
+    factor_ = normal_;
+    for (Index a = FIRST_CURVED; a < TERMS; ++a) {
+      const double deviation = a < FIRST_CUBIC ? prior_.quadratic : prior_.cubic;
+      factor_[a][a] += (prior_.noise / deviation) * (prior_.noise / deviation);
+    }
+    for (Index a = 0; a < TERMS; ++a) {
+      for (Index b = 0; b <= a; ++b) {
+        double entry = factor_[a][b];
+        for (Index k = 0; k < b; ++k) entry -= factor_[a][k] * factor_[b][k];
+        if (a == b && !(entry > LEAST_PIVOT)) return false;
+        factor_[a][b] = a == b ? std::sqrt(entry) : entry / factor_[b][b];
+      }
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      half_[axis] = lower_solution(right_[axis]);
+      solution_[axis] = half_[axis];
+      for (Index a = TERMS - 1; a >= 0; --a) {
+        for (Index k = a + 1; k < TERMS; ++k) solution_[axis][a] -= factor_[k][a] * solution_[axis][k];
+        solution_[axis][a] /= factor_[a][a];
+      }
+    }
     return true;
   }
-  // The place of a point that is `beyond` edges from the nearest known one.
-  MappedPoint at(double x_mm, double y_mm, double beyond) const {
-    const Terms row = terms(x_mm, y_mm);
-    const double u = row[1], v = row[2];
-    MappedPoint out{x_px_, y_px_, 0.0, 0.0, 0.0, 0.0, 0.0};
-    for (Index a = 0; a < TERMS; ++a) out.x += row[a] * solution_[0][a], out.y += row[a] * solution_[1][a];
-    const auto slope = [&](const Terms& s, double du, double dv) {
-      return (du * (s[1] + 2.0 * u * s[3] + v * s[4]) + dv * (s[2] + u * s[4] + 2.0 * v * s[5])) / size_mm_;
-    };
-    out.xx = slope(solution_[0], 1.0, 0.0), out.xy = slope(solution_[0], 0.0, 1.0);
-    out.yx = slope(solution_[1], 1.0, 0.0), out.yy = slope(solution_[1], 0.0, 1.0);
-    const double edge2 = std::abs(out.xx * out.yy - out.xy * out.yx) * size_mm_ * size_mm_;
-    const double unseen = prior_.unseen * beyond * beyond * beyond;
-    out.variance = edge2 * (prior_.noise * prior_.noise * (1.0 + leverage(row)) + unseen * unseen);
-    return out;
+  // Squared misfit of the points and of the prior, in variances of noise, over both axes.
+  double misfit() const {
+    double explained = 0.0;
+    for (const Terms& half : half_)
+      for (const double value : half) explained += value * value;
+    return (squares_ - explained) / (prior_.noise * prior_.noise);
+  }
+  MappedPoint at(double x_mm, double y_mm) const {
+    const Terms row = terms(x_mm, y_mm), half = lower_solution(row);
+    double x = 0.0, y = 0.0, leverage = 0.0;
+    for (Index a = 0; a < TERMS; ++a) {
+      x += row[a] * solution_[0][a];
+      y += row[a] * solution_[1][a];
+      leverage += half[a] * half[a];
+    }
+    const double edge = frame_.edge_px;
+    return {frame_.x_px + edge * x, frame_.y_px + edge * y,
+            edge * edge * prior_.noise * prior_.noise * (1.0 + leverage)};
   }
 
  private:
-  static constexpr Index TERMS = 6, FIRST_CURVED = 3;
-  static constexpr double LEAST_PIVOT = 1e-2;  // cells, on one line to a tenth of an edge
+  static constexpr Index TERMS = 10, FIRST_CURVED = 3, FIRST_CUBIC = 6;
+  static constexpr double LEAST_PIVOT = 1e-6;  // squared edges: points on one line
   using Terms = std::array<double, TERMS>;
 
   Terms terms(double x_mm, double y_mm) const {
-    const double u = (x_mm - x_mm_) / size_mm_, v = (y_mm - y_mm_) / size_mm_;
-    return {1.0, u, v, u * u, u * v, v * v};
+    const double u = (x_mm - frame_.x_mm) / frame_.edge_mm, v = (y_mm - frame_.y_mm) / frame_.edge_mm;
+    return {1.0, u, v, u * u, u * v, v * v, u * u * u, u * u * v, u * v * v, v * v * v};
   }
-  // The variance of the map at a row of terms over that of one point.
-  double leverage(const Terms& row) const {
-    double sum = 0.0;
-    Terms z;
+  Terms lower_solution(const Terms& right) const {
+    Terms out;
     for (Index a = 0; a < TERMS; ++a) {
-      z[a] = row[a];
-      for (Index b = 0; b < a; ++b) z[a] -= factor_(a, b) * z[b];
-      z[a] /= factor_(a, a);
-      sum += z[a] * z[a];
+      out[a] = right[a];
+      for (Index k = 0; k < a; ++k) out[a] -= factor_[a][k] * out[k];
+      out[a] /= factor_[a][a];
     }
-    return sum;
+    return out;
   }
 
-  double x_mm_, y_mm_, size_mm_;
+  MapFrame frame_;
   MapPrior prior_;
-  double x_px_ = 0.0, y_px_ = 0.0;
   Index count_ = 0;
-  Array<double, 2> normal_{{TERMS, TERMS}, 0.0}, right_{{2, TERMS}, 0.0}, factor_;
-  std::array<Terms, 2> solution_{};
+  double squares_ = 0.0;
+  std::array<Terms, TERMS> normal_{}, factor_{};
+  std::array<Terms, 2> right_{}, half_{}, solution_{};
 };
 
 }  // namespace cmp::localmap

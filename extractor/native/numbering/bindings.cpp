@@ -3,6 +3,7 @@
 
 #include "numbering/ink_fields.hpp"
 #include "numbering/lattice_walk.hpp"
+#include "numbering/link_inks.hpp"
 #include "numbering/marker_places.hpp"
 #include "numbering/part_attachment.hpp"
 #include "numbering/registration.hpp"
@@ -11,7 +12,9 @@ namespace cmp::numbering {
 
 void add_numbering(nb::module_ module) {
   bind<&walk_cells>(module, "walk_cells", {"links", "limits"});
-  bind<&ink_fields>(module, "ink_fields", {"view", "cells", "part", "limits"});
+  bind<&cell_light>(module, "cell_light", {"view", "center", "corner"});
+  bind<&contradicted_links>(module, "contradicted_links", {"links", "light", "limits"});
+  bind<&ink_fields>(module, "ink_fields", {"view", "cells", "light", "part", "limits"});
   bind<&register_part>(module, "register_part",
                        {"axial", "naming", "white_axial", "white", "layout", "limits"});
   bind<&moved_cells>(module, "moved_cells", {"axial", "turn", "dq", "dr", "cell_lookup"});

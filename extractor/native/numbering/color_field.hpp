@@ -28,10 +28,12 @@ class ColorField {
              const FieldLimits& limits) {
     const auto count = static_cast<Index>(members.size());
     if (count == 0) return;
-    terms_ = count >= limits.quadratic_cells ? TERMS : count >= limits.linear_cells ? 3 : 1;
+    const Index most = count >= limits.quadratic_cells ? TERMS : count >= limits.linear_cells ? LINEAR : 1;
     set_frame(xy, members);
     std::vector<double> weight(members.size(), 1.0), residual(members.size()), sorted;
+    // from degree 0 on: a group of outliers at the rim could bend a quadratic field to its color
     for (std::int64_t round = 0; round < limits.robust_rounds; ++round) {
+      terms_ = std::min(most, round == 0 ? 1 : round == 1 ? LINEAR : TERMS);
       solve(xy, colors, members, weight);
       for (std::size_t n = 0; n < members.size(); ++n) {
         const Color field = at(xy(members[n], 0), xy(members[n], 1));
@@ -57,7 +59,7 @@ class ColorField {
   double scatter() const { return scatter_; }  // the median residual, summed over the channels
 
  private:
-  static constexpr Index TERMS = 6;
+  static constexpr Index TERMS = 6, LINEAR = 3;
   static constexpr double RIDGE = 1e-6;  // of the weight; cells on one line have a solution, too
   using Terms = std::array<double, TERMS>;
 

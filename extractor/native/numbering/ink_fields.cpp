@@ -6,7 +6,7 @@
 
 #include "numbering/color_field.hpp"
 #include "numbering/lattice_motion.hpp"
-#include "numeric/bilinear_batch.hpp"
+#include "numeric/bilinear.hpp"
 #include "numeric/median.hpp"
 
 namespace cmp::numbering {
@@ -25,27 +25,21 @@ double light_between(View<const float, 1> light, double value) {
   return (1.0 - share) * light[low] + share * light[low + 1];
 }
 
-// The light at points (N, 2) of the full image, mean of seven samples within a radius (N,); NaN outside the image.
-std::vector<Color> light_at_points(const image::PyramidLevel& view, View<const double, 2> xy,
-                                   View<const double, 1> radius) {
+// The light at points (N, 2) of the full image; NaN outside the image. A pixel of a reduced scale is a mean.
+std::vector<Color> light_at_points(const image::PyramidLevel& view, View<const double, 2> xy) {
   const auto scale = static_cast<double>(view.scale);
+  const Index height = view.image.size(0), width = view.image.size(1);
+  const auto flat = view.image.flat();
+  const double right = static_cast<double>(width) - numeric::BORDER_PX, bottom = static_cast<double>(height) - numeric::BORDER_PX;
+  constexpr double ONE = 1.0 / (numeric::SUBPIXEL_STEPS * numeric::SUBPIXEL_STEPS);
   std::vector<Color> out(static_cast<std::size_t>(xy.size()), Color{NOWHERE, NOWHERE, NOWHERE});
-  auto buffers = numeric::allocate_sample_buffers();
-  const auto patches = buffers.patches.view();
-  for (Index begin = 0; begin < xy.size(); begin += numeric::BATCH_POINTS) {
-    const Index count = std::min<Index>(xy.size() - begin, numeric::BATCH_POINTS);
-    for (Index n = 0; n < count; ++n) {
-      patches[numeric::X + n] = (xy(begin + n, 0) + 0.5) / scale - 0.5;
-      patches[numeric::Y + n] = (xy(begin + n, 1) + 0.5) / scale - 0.5;
-      patches[numeric::RADIUS + n] = radius[begin + n] / scale;
-    }
-    numeric::fill_patch_means(view.image.flat(), view.image.size(0), view.image.size(1), count, buffers);
-    for (Index n = 0; n < count; ++n) {
-      if (!(patches[numeric::INSIDE + n] > 0.0)) continue;
-      for (Index c = 0; c < CHANNELS; ++c)
-        out[begin + n][c] =
-            light_between(view.response.light, patches[numeric::COLOR + c * numeric::BATCH_POINTS + n]);
-    }
+  for (Index i = 0; i < xy.size(); ++i) {
+    const double x = (xy(i, 0) + 0.5) / scale - 0.5, y = (xy(i, 1) + 0.5) / scale - 0.5;
+    if (!(x >= 0.0 && y >= 0.0 && x <= right && y <= bottom)) continue;
+    const auto sums = numeric::channel_sums_at(flat, width, x, y);
+    out[i] = {light_between(view.response.light, ONE * static_cast<double>(sums.s0)),
+              light_between(view.response.light, ONE * static_cast<double>(sums.s1)),
+              light_between(view.response.light, ONE * static_cast<double>(sums.s2))};
   }
   return out;
 }
@@ -54,12 +48,14 @@ std::vector<Color> light_at_points(const image::PyramidLevel& view, View<const d
 Color median_color(const std::vector<Color>& colors) {
   Color out{NOWHERE, NOWHERE, NOWHERE};
   std::vector<double> values;
+  values.reserve(colors.size());
   for (Index c = 0; c < CHANNELS; ++c) {
     values.clear();
     for (const Color& color : colors)
       if (std::isfinite(color[c])) values.push_back(color[c]);
     const auto count = static_cast<Index>(values.size());
-    if (count > 0) out[c] = numeric::median_of_many(View<double, 1>(values.data(), {count}));
+    const View<double, 1> all(values.data(), {count});
+    if (count > 0) out[c] = count <= SIDES ? numeric::median_of(all, count) : numeric::median_of_many(all);
   }
   return out;
 }
@@ -70,47 +66,17 @@ Color difference(const Color& a, const Color& b) {
   return out;
 }
 
-// The edges of a cell's triangle from corner 0 to corners 1 and 2, and the mean edge.
+// The edges of a cell's triangle from corner 0 to corners 1 and 2.
 struct CellBasis {
-  double ux, uy, vx, vy, edge;
+  double ux, uy, vx, vy;
 
   CellBasis(const WalkedCells& cells, Index i) {
     const auto corner = cells.corner_px[i];
     const int a = cells.first[i], b = (a + 1) % 3, c = (a + 2) % 3;
     ux = corner(b, 0) - corner(a, 0), uy = corner(b, 1) - corner(a, 1);
     vx = corner(c, 0) - corner(a, 0), vy = corner(c, 1) - corner(a, 1);
-    edge = std::sqrt(std::abs(ux * vy - uy * vx) * 2.0 / std::sqrt(3.0));
   }
 };
-
-// (N,) the light of cells over that of the black cells that share their sides.
-std::vector<Color> light_over_black(const image::PyramidLevel& view, const WalkedCells& cells,
-                                    const InkFieldLimits& limits) {
-  const Index count = cells.center_px.size();
-  Array<double, 2> xy({(1 + SIDES) * count, 2});
-  Array<double, 1> radius({(1 + SIDES) * count});
-  for (Index i = 0; i < count; ++i) {
-    const double reach = limits.sample_radius * CellBasis(cells, i).edge;
-    for (Index k = 0; k <= SIDES; ++k) {
-      const Index n = (1 + SIDES) * i + k;
-      for (int axis = 0; axis < 2; ++axis) {
-        const double center = cells.center_px(i, axis);
-        // the neighbour across a side lies opposite to a corner, at the same distance
-        xy(n, axis) = k == 0 ? center : 2.0 * center - cells.corner_px(i, k - 1, axis);
-      }
-      radius[n] = reach;
-    }
-  }
-  const auto shown = light_at_points(view, xy, radius);
-  std::vector<Color> out;
-  for (Index i = 0; i < count; ++i) {
-    const auto own = shown.begin() + (1 + SIDES) * i;
-    const std::vector<Color> around(own + 1, own + 1 + SIDES);
-    const Color black = median_color(around);
-    out.push_back(std::isfinite(black[0]) ? difference(*own, black) : Color{NOWHERE, NOWHERE, NOWHERE});
-  }
-  return out;
-}
 
 // The down-cells around a part: a table of axial places.
 class DownCells {
@@ -134,18 +100,15 @@ class DownCells {
       }
     const auto count = static_cast<Index>(place_.size());
     xy_ = Array<double, 2>({count, 2});
-    radius_ = Array<double, 1>({count});
     for (Index n = 0; n < count; ++n) {
       const auto sum = sums_[place_[n]];
       xy_(n, 0) = sum[X] / sum[WEIGHT], xy_(n, 1) = sum[Y] / sum[WEIGHT];
-      radius_[n] = limits.sample_radius * sum[EDGE] / sum[WEIGHT];
     }
   }
   Index size() const { return xy_.size(); }
   Index q(Index n) const { return place_[n] / columns_ + low_q_; }
   Index r(Index n) const { return place_[n] % columns_ + low_r_; }
   View<const double, 2> xy() const { return xy_; }
-  View<const double, 1> radius() const { return radius_; }
   // The down-cell's number; -1 for none.
   std::int32_t number(Index q, Index r) const {
     const Index row = q - low_q_, column = r - low_r_;
@@ -154,7 +117,7 @@ class DownCells {
   }
 
  private:
-  static constexpr Index REACH = 3, X = 0, Y = 1, EDGE = 2, WEIGHT = 3, TERMS = 4;
+  static constexpr Index REACH = 3, X = 0, Y = 1, WEIGHT = 2, TERMS = 3;
 
   // Adds the places of the down-cells up to two steps from a cell, as its triangle predicts them.
   void add_predictions(const WalkedCells& cells, Index i, const InkFieldLimits& limits) {
@@ -168,14 +131,12 @@ class DownCells {
             sums_[(cells.axial(i, 0) + dq - low_q_) * columns_ + cells.axial(i, 1) + dr - low_r_];
         sum[X] += weight * (cells.center_px(i, 0) + q * basis.ux + r * basis.vx);
         sum[Y] += weight * (cells.center_px(i, 1) + q * basis.uy + r * basis.vy);
-        sum[EDGE] += weight * basis.edge;
         sum[WEIGHT] += weight;
       }
   }
 
   Index low_q_ = INT32_MAX, low_r_ = INT32_MAX, columns_ = 0;
   Array<double, 2> sums_, xy_;
-  Array<double, 1> radius_;
   Array<std::int32_t, 1> number_;
   std::vector<Index> place_;
 };
@@ -224,7 +185,7 @@ Array<double, 2> odds_of(const std::vector<ColorField>& fields, View<const doubl
 // (D,) the light of the down-cells over that of the down-cells around, relative to the strongest inks there.
 Array<double, 1> whiteness_of(const image::PyramidLevel& view, const DownCells& down,
                               const std::vector<ColorField>& fields) {
-  const auto light = light_at_points(view, down.xy(), down.radius());
+  const auto light = light_at_points(view, down.xy());
   const Color usual = median_color(light);
   Array<double, 1> whiteness({down.size()}, NOWHERE);
   std::vector<Color> around;
@@ -249,11 +210,39 @@ Array<double, 1> whiteness_of(const image::PyramidLevel& view, const DownCells& 
   return whiteness;
 }
 
+std::vector<Color> as_colors(View<const double, 2> light) {
+  std::vector<Color> out;
+  for (Index i = 0; i < light.size(); ++i) out.push_back({light(i, 0), light(i, 1), light(i, 2)});
+  return out;
+}
+
 }  // namespace
 
-InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, std::int32_t part,
-                     const InkFieldLimits& limits) {
-  const auto light = light_over_black(view, cells, limits);
+Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 2> center,
+                            View<const double, 3> corner) {
+  const Index count = center.size();
+  Array<double, 2> xy({(1 + SIDES) * count, 2}), out({count, CHANNELS}, NOWHERE);
+  for (Index i = 0; i < count; ++i)
+    for (Index k = 0; k <= SIDES; ++k)
+      for (int axis = 0; axis < 2; ++axis)
+        // the neighbour across a side lies opposite to a corner, at the same distance
+        xy((1 + SIDES) * i + k, axis) =
+            k == 0 ? center(i, axis) : 2.0 * center(i, axis) - corner(i, k - 1, axis);
+  const auto shown = light_at_points(view, xy);
+  for (Index i = 0; i < count; ++i) {
+    const auto own = shown.begin() + (1 + SIDES) * i;
+    if (!std::isfinite((*own)[0])) continue;
+    const Color black = median_color({own + 1, own + 1 + SIDES});
+    if (!std::isfinite(black[0])) continue;
+    const Color light = difference(*own, black);
+    std::copy(light.begin(), light.end(), out[i].begin());
+  }
+  return out;
+}
+
+InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, View<const double, 2> shown,
+                     std::int32_t part, const InkFieldLimits& limits) {
+  const auto light = as_colors(shown);
   std::vector<Index> members;
   std::array<std::vector<Index>, CLASSES> of_class;
   for (Index i = 0; i < cells.part.size(); ++i) {

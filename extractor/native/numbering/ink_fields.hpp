@@ -11,12 +11,12 @@ namespace cmp::numbering {
 
 // The limits of the fields; the Python module explains them.
 struct InkFieldLimits {
-  double sample_radius, place_softening, place_reach2, residual_scale, least_share, least_scatter;
+  double place_softening, place_reach2, residual_scale, least_share, least_scatter;
   std::int64_t robust_rounds, quadratic_cells, linear_cells;
 
   template <class F>
   static InkFieldLimits read(const F& f) {
-    return {f["sample_radius"], f["place_softening"], f["place_reach2"],    f["residual_scale"], f["least_share"],
+    return {f["place_softening"], f["place_reach2"],    f["residual_scale"], f["least_share"],
             f["least_scatter"], f["robust_rounds"],   f["quadratic_cells"], f["linear_cells"]};
   }
 };
@@ -35,7 +35,12 @@ struct WalkedCells {
   }
 };
 
-// Colors of the cells of one part.
+// (N, 3) the light (B, G, R, units of 1/255) of cells over that of the black cells that share their sides; NaN where
+// one of these places is outside the image. center (N, 2), corner (N, 3, 2) without swelling.
+Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 2> center,
+                            View<const double, 3> corner);
+
+// Colors of the cells of one part; light (N, 3) by cell_light.
 //
 // shares (3, 3), the mean log of each class's share of the light in each channel (B, G, R); odds (N, 3), the log
 // likelihoods of each cell of the image for the three classes, in (-inf, 0]; then of the part's down-cells the
@@ -44,7 +49,7 @@ struct WalkedCells {
 using InkFields =
     std::tuple<Array<double, 2>, Array<double, 2>, Array<std::int32_t, 2>, Array<double, 2>, Array<double, 1>>;
 
-InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, std::int32_t part,
-                     const InkFieldLimits& limits);
+InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, View<const double, 2> light,
+                     std::int32_t part, const InkFieldLimits& limits);
 
 }  // namespace cmp::numbering
