@@ -44,6 +44,7 @@ from extractor.result import Markers, Origin, Reason
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
+EQUILATERAL_AREA = math.sqrt(3.0) / 4.0  # over the square of the side
 MAX_HOLE_SHARE = 0.02  # of a lattice that is not looked at more closely; chosen
 MIN_HOLES = 4  # the same as a number: the white cell may hide its three neighbours. Chosen
 
@@ -65,6 +66,12 @@ class FoundCells(NamedTuple):
     def count(self) -> int:
         """The number of linked cells."""
         return int(np.count_nonzero(self.walk.part >= 0))
+
+    def is_small(self, view: PyramidLevel) -> bool:
+        """Whether the linked cells are too small for this reduced scale; also without any."""
+        areas = self.cells.area_px[self.walk.part >= 0]
+        least = EQUILATERAL_AREA * (MIN_LEVEL_EDGE_PX * view.scale) ** 2
+        return view.scale > 1 and (len(areas) == 0 or float(np.median(areas)) < least)
 
 
 class NumberedCells(NamedTuple):
@@ -270,36 +277,26 @@ class Extractor:
         return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
-        """Stages 2 to 7 at the coarsest scale that numbers cells; else the reason where most cells were found."""
+        """Stages 2 to 7 at the coarsest scale, and with the least effort, that numbers the cells; else the reason where
+        most cells were found."""
         failed = Unnumbered(Refusal(Reason.NO_PATTERN))
         for scale in _recognition_scales(pyramid.size):
             view = pyramid.level(scale)
-            found = self._find_cells(view, stages)
-            if found is None:
-                continue
-            numbering = self._registration.number(view, *found)
-            stages.record("number", numbering)
-            if not isinstance(numbering, Refusal):
-                return NumberedCells(found, numbering)
-            if failed.found is None or found.count >= failed.found.count:
-                failed = Unnumbered(numbering, found)
+            for effort in EFFORTS:
+                found = self._find_cells(view, effort, stages)
+                is_last = effort is EFFORTS[-1]
+                if is_last and found.is_small(view):
+                    break
+                if not is_last and not self._is_whole(found):
+                    continue
+                numbering = stages.record("number", self._registration.number(view, *found))
+                if not isinstance(numbering, Refusal):
+                    return NumberedCells(found, numbering)
+                if failed.found is None or found.count >= failed.found.count:
+                    failed = Unnumbered(numbering, found)
         return failed
 
-    def _find_cells(self, view: PyramidLevel, stages: Stages) -> FoundCells | None:
-        """Stages 2 to 6, with as much effort as the image needs; None where the cells are too small at this scale."""
-        found = None
-        for effort in EFFORTS:
-            found = self._find_cells_with(view, effort, stages)
-            if self._is_whole(found, view):
-                break
-        assert found is not None
-        sides = found.cells.area_px[found.walk.part >= 0]
-        small = MIN_LEVEL_EDGE_PX * view.scale
-        if view.scale > 1 and (len(sides) == 0 or np.median(sides) < 0.433 * small * small):
-            return None
-        return found
-
-    def _find_cells_with(self, view: PyramidLevel, effort: Effort, stages: Stages) -> FoundCells:
+    def _find_cells(self, view: PyramidLevel, effort: Effort, stages: Stages) -> FoundCells:
         cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort))
         mesh = stages.record("mesh", build_cell_mesh(cells))
         light = stages.record("light", cell_light(view, cells, mesh))
@@ -311,13 +308,12 @@ class Extractor:
         pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
         return math.sqrt(pixels / (2.0 * len(self._lattice.ink)) * 4.0 / math.sqrt(3.0))
 
-    def _is_whole(self, found: FoundCells, view: PyramidLevel) -> bool:
+    def _is_whole(self, found: FoundCells) -> bool:
         """Whether the cells of an image are all found, as far as the cells themselves show it."""
-        if found.count < self._registration.min_cells:
-            return False
-        if count_holes(found.walk) > max(MAX_HOLE_SHARE * found.count, MIN_HOLES):
-            return False
-        return True
+        return found.count >= self._registration.min_cells and count_holes(found.walk) <= max(
+            MAX_HOLE_SHARE * found.count, MIN_HOLES
+        )
+
 
 def _recognition_scales(size: tuple[int, int]) -> list[int]:
     """The scales at which recognition is tried, from coarse to fine, for an image of this width and height, px."""

@@ -57,7 +57,8 @@ class InkFields:
 
     Attributes:
         shares: (3, 3) float64, the mean log of each class's share of the light in each channel (B, G, R).
-        odds: (N, 3) float64, the log likelihoods of each cell of the image for the three classes, at most 0.
+        odds: (N, 3) float64, the log likelihoods of each cell of the image for the three classes, relative to the
+            likeliest one.
         down_axial: (D, 2) int32, the part's down-cells: the black ones and the white one.
         down_px: (D, 2) float64, their places.
         whiteness: (D,) float64, their light over the black around, relative to the strongest inks there; NaN outside

@@ -28,11 +28,11 @@ MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; 
 MAX_PARTS = 4  # that are tried for the origin, the largest; chosen
 NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
 SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
+MAX_BRIGHT = 12  # bright places that are looked at; with more of them none is evidence. Chosen
 MAX_TIED = 24  # motions between which the other parts may decide; chosen, for time
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
 JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
-ODD_INK = -8.0  # log likelihood of a cell's class below which another class ...
-FITTING_INK = -2.0  # ... above this one says that the cell is on a wrong place; chosen
+ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
 
 
 class WitnessLimits(NamedTuple):
@@ -61,12 +61,18 @@ class WhiteLimits(NamedTuple):
         dark: whiteness of a black cell; blurred and milky black stays below. Chosen.
         white_is_bright: probability that the white cell is bright. Chosen.
         white_is_dark: log odds against a dark place. Chosen.
+        is_triangle: more log odds for a bright place with the triangle of a down-cell. Chosen.
+        center_reach: in edges, from a down-cell's place to the center of this triangle. Chosen.
+        corner_reach: in edges, between its corners and those of a cell turned around. Chosen.
     """
 
     bright: float = 0.6
     dark: float = 0.3
     white_is_bright: float = 0.9
     white_is_dark: float = -3.0
+    is_triangle: float = 3.0
+    center_reach: float = 0.3
+    corner_reach: float = 0.4
 
 
 class MapPrior(NamedTuple):
@@ -91,24 +97,28 @@ class AttachmentLimits(NamedTuple):
         known_cells: placed cells through which a map goes. Chosen.
         judged_cells: cells of a part by which its motion is judged, those nearest to placed ones. Chosen.
         max_rounds: passes over all parts. Chosen.
+        max_places: tried for a cell; with more the map is too uncertain. Chosen.
         reach: in edges, of the places that are tried for a cell, beyond the nearest. Derived: the next places of
             the lattice.
         max_corner_misfit: in edges, between a cell's corners and those of the map; a triangle that points the other way
             has 1.15. Chosen.
-        max_misfit: least log likelihood of an accepted part, times the root of its judged cells. Chosen.
+        max_misfit: mean log likelihood of the judged cells of an accepted part. Chosen.
         outside_odds: log likelihood of a cell that lies outside, on a taken place, or nowhere near. Chosen.
         margin: lead of the best motion. Chosen.
+        margin_of_misfit: the same, in addition, relative to the misfit of the best motion. Chosen.
     """
 
     prior: MapPrior = MapPrior()
     known_cells: int = 24
     judged_cells: int = 16
     max_rounds: int = 6
+    max_places: int = 80
     reach: float = 1.8
     max_corner_misfit: float = 0.6
     max_misfit: float = 8.0
     outside_odds: float = -12.5
     margin: float = 6.0
+    margin_of_misfit: float = 2.5
 
 
 WITNESSES = WitnessLimits()
@@ -265,7 +275,7 @@ class Registration:
             return Refusal(self._palette.other_side_reason(fields.shares), fields)
         naming = NAMING_WEIGHT * (own - own.max())
         axial = np.ascontiguousarray(walked.axial[walked.part == part])
-        white = white_odds(fields.whiteness)
+        white = white_odds(fields.whiteness, white_triangles(walked, part, fields))
         found = native.register_part(axial, naming, fields.down_axial, white, self._layout, WITNESSES)
         return _Placed(part, walked, fields, Motions(*found), mirrored)
 
@@ -317,11 +327,30 @@ def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bo
     Args:
         odds: (N, 3), the log likelihoods of the classes.
     """
-    mine = odds[np.arange(len(odds)), own % 3]
-    return (mine < ODD_INK) & (odds.max(axis=1) > FITTING_INK)
+    return np.asarray(odds[np.arange(len(odds)), own % 3] < ODD_INK)
 
 
-def white_odds(whiteness: NDArray[np.float64]) -> NDArray[np.float64]:
+def white_triangles(cells: WalkedCells, part: int, fields: InkFields) -> NDArray[np.bool_]:
+    """(D,) bool, the bright down-cells at which a region was found that is a triangle as a down-cell is there.
+
+    A drop, glare or a scratch hardly ever ends at the sides of a cell.
+    """
+    found = np.zeros(len(fields.whiteness), np.bool_)
+    vectors = cells.corner_px - cells.center_px[:, None]
+    members = np.flatnonzero(cells.part == part)
+    for n in np.flatnonzero(fields.whiteness > WHITE.bright)[:MAX_BRIGHT]:
+        place = fields.down_px[n]
+        distance = np.hypot(*(cells.center_px - place).T)
+        region, near = int(distance.argmin()), members[distance[members].argmin()]
+        edge = np.linalg.norm(vectors[near, 0] - vectors[near, 1])
+        if distance[region] > WHITE.center_reach * edge:
+            continue
+        misfits = [np.linalg.norm(vectors[region] + np.roll(vectors[near], k, axis=0), axis=1).max() for k in range(3)]
+        found[n] = min(misfits) < WHITE.corner_reach * edge
+    return found
+
+
+def white_odds(whiteness: NDArray[np.float64], is_triangle: NDArray[np.bool_]) -> NDArray[np.float64]:
     """(D,) log odds that a down-cell of this whiteness (D,) is the white one over a black one; NaN is unknown.
 
     How often a black cell is bright is seen in the image itself: glare, dirt and scratches are bright, too.
@@ -331,6 +360,7 @@ def white_odds(whiteness: NDArray[np.float64]) -> NDArray[np.float64]:
     others = max(int(bright.sum()) - 1, 0)
     is_bright = np.log(WHITE.white_is_bright * (known.sum() + 1.0) / (others + 0.5))
     dark = known & (whiteness < WHITE.dark)
+    is_bright = is_bright + np.where(is_triangle, WHITE.is_triangle, 0.0)
     return np.where(known, np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0)), np.nan)
 
 

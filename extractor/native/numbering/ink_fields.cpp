@@ -176,8 +176,12 @@ Array<double, 2> odds_of(const std::vector<ColorField>& fields, View<const doubl
         strength += std::max(field[c], 0.0);
       }
       const double ratio = residual / std::max(2.0 * fields[k].scatter(), limits.least_scatter * strength + 1e-6);
-      odds(i, k) = std::max(-0.5 * ratio * ratio, LEAST_ODDS);
+      odds(i, k) = -0.5 * ratio * ratio;
     }
+    // relative to the likeliest class: a color that fits none says nothing
+    const double most = std::max({odds(i, 0), odds(i, 1), odds(i, 2)});
+    const bool is_known = most > LEAST_ODDS;
+    for (Index k = 0; k < CLASSES; ++k) odds(i, k) = is_known ? std::max(odds(i, k) - most, LEAST_ODDS) : 0.0;
   }
   return odds;
 }

@@ -43,7 +43,7 @@ Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 
 // Colors of the cells of one part; light (N, 3) by cell_light.
 //
 // shares (3, 3), the mean log of each class's share of the light in each channel (B, G, R); odds (N, 3), the log
-// likelihoods of each cell of the image for the three classes, in (-inf, 0]; then of the part's down-cells the
+// likelihoods of each cell of the image for the three classes, relative to the likeliest one; then of the part's down-cells the
 // axial places (D, 2), the places (D, 2) px, and whiteness (D,): light over the local black, relative to the
 // strongest inks there; NaN outside the image.
 using InkFields =

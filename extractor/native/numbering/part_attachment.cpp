@@ -150,8 +150,10 @@ class Attachment {
           second = {motion, score};
         }
       }
-    const double least = -limits_.max_misfit * std::sqrt(static_cast<double>(judged.size()));
-    if (best.score < least || best.score - second.score < limits_.margin) return false;
+    // the cells beside a cut are cut themselves; the best motion must be far better than the second, not perfect
+    const double least = -limits_.max_misfit * static_cast<double>(judged.size());
+    const double margin = limits_.margin - limits_.margin_of_misfit * best.score;
+    if (best.score < least || best.score - second.score < margin) return false;
     for (const Index i : part) {
       const std::int32_t u = moved(i, best.motion);
       if (u < 0 || is_taken_[u]) continue;
@@ -195,6 +197,7 @@ class Attachment {
       least = std::min(least, here);
       if (here > least + limits_.reach) continue;
       out.push_back(near[n]);
+      if (static_cast<std::int64_t>(out.size()) > limits_.max_places) return {};  // the map is too uncertain
       for (Index k = 0; k < layout_.cell_neighbours.size(1); ++k) {
         const std::int32_t next = layout_.cell_neighbours(near[n], k);
         if (next < 0 || seen_[next] == search_) continue;
