@@ -102,7 +102,7 @@ def calibrate_pattern(
         and Path(output).resolve() == Path(layout).resolve()
     ):
         raise CmpDesignError(f"{output} is the nominal layout itself; give another name")
-    names, pictures = _read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
+    names, pictures = read_pictures([images] if isinstance(images, str | Path) else images, max_pixels)
     learnt = learn_layout(
         reference_from(layout),
         pictures,
@@ -116,7 +116,7 @@ def calibrate_pattern(
     return learnt
 
 
-def _read_pictures(
+def read_pictures(
     images: Sequence[str | Path] | Sequence[NDArray[Any]], max_pixels: int
 ) -> tuple[list[str], list[NDArray[Any]]]:
     """The names and the pixels of pictures; a folder or a pattern stands for its pictures."""
@@ -159,7 +159,7 @@ def run_experiment(
         seed: seed of all random values.
         workers: processes; None: one for each core.
         sensor: name of a sensor template, or a TOML file.
-        preset: the reader's preset: "fast", "balanced" or "accurate".
+        preset: the reader's preset: "balanced" or "accurate".
 
     Returns:
         The JSON object of report.json.

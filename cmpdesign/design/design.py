@@ -19,7 +19,8 @@ from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.names import MOST_NAME_LETTERS, Line, Name, nearest_name
 from cmpdesign.inputs.validation import validation_message
 from cmpdesign.patterns import registered_patterns
-from cmpdesign.patterns.graphs import MAX_LAYERS
+from cmpdesign.patterns.graphs import MAX_LAYERS, TRIANGULAR_GRAPHS
+from cmpdesign.patterns.pad_code import DEFAULT_SHARE, MAX_CODE, MAX_SHARE, MIN_SHARE
 
 # An ellipse flatter than 4 : 1 has cells with corners below 15 degrees, which cannot be printed or read.
 ASPECT_MIN, ASPECT_MAX = 0.25, 4.0
@@ -95,6 +96,20 @@ class Design(_StrictModel):
         5, ge=0, le=MAX_VIRTUAL_PER_EDGE, strict=True, description="Number of virtual markers on every edge."
     )
 
+    code: int = Field(
+        0,
+        ge=0,
+        le=MAX_CODE,
+        strict=True,
+        description="Number of the pad's code: more black cells are white, and parts of the pad are numbered. 0: none.",
+    )
+    code_share: float = Field(
+        DEFAULT_SHARE,
+        ge=MIN_SHARE,
+        le=MAX_SHARE,
+        description="With a code: share of the black cells that are white.",
+    )
+
     clip: Literal["none", "rectangle", "circle"] = Field(
         "none",
         description="Outline around the centre; cells that are not inside the outline (less the border) are removed.",
@@ -152,7 +167,7 @@ class Design(_StrictModel):
         if all(given):
             return (
                 "pitch_mm, layers and an overall size (width_mm, height_mm) fix the size twice; "
-                "leave one of the three out (a value of a template by --set layers=none)"
+                "leave one of the three out (a value of a template by layers=none)"
             )
         if sum(given) == 2 or (self.pitch_mm is not None and self.clip != "none"):
             return ""
@@ -183,6 +198,10 @@ class Design(_StrictModel):
         return ""
 
     def _option_problem(self) -> str:
+        if self.code and registered_patterns()[self.pattern].graph is not TRIANGULAR_GRAPHS:
+            return (
+                f"code = {self.code} is an option of triangular patterns, not of {self.pattern}; leave it out"
+            )
         for option in ("aspect", "spacing"):
             if getattr(self, option) is None or option in registered_patterns()[self.pattern].options:
                 continue
@@ -198,7 +217,7 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None
 
     Args:
         name_or_path: a template's name ("tac3d") or the path of a TOML file.
-        overrides: field -> value, or a text as after ``--set``. "palette.red" names a field of a table. None and the
+        overrides: field -> value, or a text as ``--set`` takes it. "palette.red" names a field of a table. None and the
             text "none" remove the field.
 
     Raises:

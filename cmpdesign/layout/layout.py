@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.patterns.colors import BLACK
+from cmpdesign.patterns.pad_code import PadCode
 
 # Coordinates are rounded to a picometre, so that every machine writes the same digits.
 DECIMALS = 9
@@ -31,6 +32,8 @@ class AsMade:
             markers.
         covariance_mm2: (M, 2, 2) float64, of the places of the layout's markers, NaN for a marker that was not
             measured and stays at its nominal place; None: unknown.
+        cell_height_mm: height of the cells over the black, which holds the markers, towards the camera; negative:
+            recessed cells; 0: flat.
     """
 
     of: str
@@ -38,6 +41,7 @@ class AsMade:
     side: Literal["front", "back"]
     outlines_mm: NDArray[np.float64] | None = None
     covariance_mm2: NDArray[np.float64] | None = None
+    cell_height_mm: float = 0.0
 
     def __post_init__(self) -> None:
         for column in (self.outlines_mm, self.covariance_mm2):
@@ -65,6 +69,7 @@ class Layout:
             first point not repeated.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
         fiducial_diameter_mm: the marks' diameter.
+        code: the pad's code; None: the reference cell alone is white.
         as_made: differences of a made pad from the design; None: as designed.
     """
 
@@ -84,6 +89,7 @@ class Layout:
     outline_mm: NDArray[np.float64]
     fiducials_mm: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     fiducial_diameter_mm: float = 0.0
+    code: PadCode | None = None
     as_made: AsMade | None = None
 
     def __post_init__(self) -> None:
@@ -140,6 +146,11 @@ class Layout:
             return self.as_made.outlines_mm
         outlines: NDArray[np.float64] = self.marker_xy_mm[self.cell_corners[self.colored_cells]]
         return outlines
+
+    @property
+    def cell_height_mm(self) -> float:
+        """Height of the cells over the black, towards the camera; negative: recessed; 0 for a flat pad."""
+        return 0.0 if self.as_made is None else self.as_made.cell_height_mm
 
     @cached_property
     def virtual_xy_mm(self) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ One such step is nearly enough.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,6 +44,7 @@ from extractor.refine.refinement_step import (
     gridlines_of,
     with_pattern_moved,
 )
+from extractor.refine.relief import find_parallax, without_parallax
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
 from extractor.refine.synthesis_steps import SynthesisSolver
@@ -53,6 +55,7 @@ SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at
 MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
+RELIEF_POINTS = 3  # on each gridline, by which the parallax of cells is found; chosen
 
 
 class FullScaleLimits(NamedTuple):
@@ -93,8 +96,22 @@ class Refiner:
         Args:
             pyramid: the image.
             places: the markers' places, to about a pixel.
-            before: the appearance of the previous image of a sequence.
+            before: the appearance of the previous image of a sequence, whose parallax is kept: a contact must not
+                move it, as all displacements would change.
         """
+        refined = self._apparent_markers(pyramid, places, before)
+        found = refined.appearance.parallax
+        if found is None:
+            return refined
+        parallax = before.parallax if before is not None and before.parallax is not None else found
+        xy_px, cov_px2, points = without_parallax(parallax, refined.xy_px, refined.cov_px2, refined.points)
+        appearance = refined.appearance._replace(parallax=parallax)
+        return replace(refined, xy_px=xy_px, cov_px2=cov_px2, points=points, appearance=appearance)
+
+    def _apparent_markers(
+        self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None
+    ) -> RefinedMarkers:
+        """The markers where the picture shows them; see ``__call__``."""
         usual_edge = short_edge(places.xy_px, self._topology.edges, SHORT_RARITY)
         if before is not None and before.scale == self._reduction_scale(
             before.scale * before.sigma, usual_edge
@@ -214,8 +231,13 @@ class Refiner:
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
         xy, cov = native.at_full_scale(xy, cov, places, scale, FULL_SCALE_LIMITS)
+        parallax = None
+        if self._topology.cell_height != 0.0:
+            beside = measure_virtual_markers(view, picture, reading, RELIEF_POINTS)[..., :2]
+            size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
+            parallax = find_parallax(self._topology, xy, beside, size_px)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
-        appearance = Appearance(scale, *look)
+        appearance = Appearance(scale, *look, parallax)
         blur, noise = scale * estimate.sigma, scale * estimate.noise
         return RefinedMarkers(
             xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)

@@ -1,0 +1,127 @@
+"""Documents of the commands that take a design, and of the commands with which a design begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
+
+from pydantic import Field
+
+from cmpdesign.documents.document import Document, Part
+
+
+class FindingPart(Part):
+    """One feature that cannot be made or read."""
+
+    severity: Literal["error", "warning"] = Field(
+        description="error: the feature will not work. warning: the feature works under good conditions only."
+    )
+    subject: str
+    value: float
+    limit: float
+    unit: str = Field(description="Unit of value and limit; empty for a plain number.")
+    remedy: str
+
+
+class PadReadingPart(Part):
+    """The reading of the pad that a product makes; null where no marker was measured."""
+
+    measured_share: float = Field(description="Measured markers over visible markers.")
+    side_seen: Literal["front", "back"] | None
+    rms_px: float | None = Field(description="Deviation of the markers from their nominal places.")
+    rms_mm: float | None
+    rms_pitch: float | None = Field(description="The same deviation, in distances of neighbouring markers.")
+    worst_px: float | None
+    worst_mm: float | None
+    worst_pitch: float | None
+
+
+class BuildDocument(Document):
+    """What ``build`` made."""
+
+    format: Literal["cmp-build"] = "cmp-build"
+    version: Literal[1] = 1
+    digest: str = Field(description="Of the layout, as in layout.json.")
+    folder: str
+    written: tuple[str, ...] = Field(description="Written files, with the folder.")
+    removed: tuple[str, ...] = Field(description="Removed files of earlier builds.")
+    report: dict[str, Any] = Field(description="Key figures, by the names of report.json.")
+    as_made: dict[str, PadReadingPart] = Field(description="Product -> reading of its pad.")
+    findings: tuple[FindingPart, ...]
+
+
+class CheckDocument(Document):
+    """What ``check`` found."""
+
+    format: Literal["cmp-check"] = "cmp-check"
+    version: Literal[1] = 1
+    digest: str = Field(description="Of the layout, as in layout.json.")
+    passed: bool = Field(description="True if no finding is an error.")
+    as_made: dict[str, PadReadingPart] = Field(description="Product -> reading of its pad, with --read.")
+    not_read: dict[str, str] = Field(description="Product -> why its pad cannot be made, with --read.")
+    findings: tuple[FindingPart, ...]
+
+
+class SizeDocument(Document):
+    """The design that ``size`` proposes, and the error that is predicted for it."""
+
+    format: Literal["cmp-size"] = "cmp-size"
+    version: Literal[1] = 1
+    camera_px: tuple[int, int] = Field(description="Width and height of the camera's picture.")
+    view_mm: tuple[float, float] = Field(description="Width and height of the field of view.")
+    scale_px_per_mm: float
+    design: dict[str, Any] = Field(description="The fields of a design file.")
+    markers: int
+    pitch_px: float
+    error_px: float = Field(description="Predicted error per marker and axis, of inner markers.")
+    error_um: float
+    rim_error_um: float
+    told_apart_mm: float = Field(description="Smallest distance at which two touches can be told apart.")
+    limit: str = Field(description="Limit that a finer pattern would exceed.")
+
+
+class TemplatePart(Part):
+    """One template."""
+
+    kind: str
+    name: str
+    description: str
+    source: str = Field(description="Source of the values; empty where each value has a source of its own.")
+
+
+class TemplatesDocument(Document):
+    """The templates that ``templates`` lists."""
+
+    format: Literal["cmp-templates"] = "cmp-templates"
+    version: Literal[1] = 1
+    templates: tuple[TemplatePart, ...]
+
+
+class TemplateDocument(Document):
+    """The template that ``templates --show`` shows."""
+
+    format: Literal["cmp-template"] = "cmp-template"
+    version: Literal[1] = 1
+    kind: str
+    name: str
+    text: str = Field(description="The TOML file.")
+
+
+class InitDocument(Document):
+    """The design file that ``init`` wrote."""
+
+    format: Literal["cmp-init"] = "cmp-init"
+    version: Literal[1] = 1
+    written: str
+    extends: str | None
+
+
+def finding_parts(findings: Iterable[Any]) -> tuple[FindingPart, ...]:
+    """The findings as parts of a document."""
+    names = FindingPart.model_fields
+    return tuple(FindingPart(**{name: getattr(finding, name) for name in names}) for finding in findings)
+
+
+def reading_parts(readings: Mapping[str, Any]) -> dict[str, PadReadingPart]:
+    """The readings of pads as parts of a document."""
+    return {name: PadReadingPart(**reading.figures()) for name, reading in readings.items()}

@@ -1,0 +1,126 @@
+"""Documents of the commands that read pictures one by one."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from cmpdesign.documents.document import Document, Part
+
+
+class QualityPart(Part):
+    """Properties of a picture; null where unknown."""
+
+    blur_px: float | None = Field(description="Sigma of the Gaussian that optics and pixel make together.")
+    noise: float | None = Field(description="Standard deviation of the noise, in 255ths.")
+    contrast: float | None = Field(description="Color difference of the two inks that differ least, CIE76.")
+    clipping: float | None = Field(description="Share of the cells that are overexposed.")
+    evenness: float | None = Field(description="Evenness of the light, 0 to 1.")
+    edge_px: float | None = Field(description="Median length of a gridline, px.")
+    weakest_inks: tuple[str, ...]
+    hints: tuple[str, ...] = Field(description="Causes that limit the result, with remedies.")
+
+
+class SheetPart(Part):
+    """Measurements of a picture of a print sheet."""
+
+    name: str
+    digest: str
+    length_x_px: float = Field(description="Length of the bar along x.")
+    length_y_px: float
+    scale_x: float | None = Field(description="Printed over designed; null without a known resolution.")
+    scale_y: float | None
+    ratio: float = Field(description="scale_x / scale_y.")
+    skew_deg: float = Field(description="Angle between the bars, less 90 degrees.")
+    rotation_deg: float = Field(description="Clockwise turn of the bar along x in the picture.")
+    perspective_mm: float = Field(description="Distance of a bar's end from the best affine map.")
+    dpi: tuple[float, ...] | None
+    note: str | None
+
+
+class ImagePart(Part):
+    """The verdict on one picture. Fields that do not apply are not set: of unread pictures, or of print sheets."""
+
+    image: str = Field(description="Path of the picture, or the name of a source and the number of a frame.")
+    verified: bool
+    error: str | None = Field(None, description="Why the picture could not be read.")
+    reason: str | None = Field(None, description="Why the picture is not verified.")
+    present: int | None = Field(None, description="Markers that are visible in the layout.")
+    measured: int | None = None
+    repaired: int | None = None
+    fitted: int | None = None
+    lost: int | None = None
+    share: float | None = Field(None, description="measured / present.")
+    mirrored: bool | None = Field(None, description="The picture shows the pattern's back.")
+    contradictions: tuple[int, ...] | None = Field(
+        None, description="Cells whose color contradicts the layout."
+    )
+    quality: QualityPart | None = None
+    timings_ms: dict[str, float] | None = Field(None, description="Stage -> time, ms.")
+    sheet: SheetPart | None = Field(None, description="Measurements, if the picture shows a print sheet.")
+
+
+class VerifyDocument(Document):
+    """The verdicts of ``verify``; also the file verify.json."""
+
+    format: Literal["cmp-verification"] = "cmp-verification"
+    version: Literal[1] = 1
+    pattern: str
+    digest: str = Field(description="Digest of the layout.")
+    min_share: float
+    verified: bool = Field(description="True if all pictures are verified.")
+    images: tuple[ImagePart, ...]
+
+    def to_json(self) -> str:
+        """The text of the document, without the fields that do not apply."""
+        return self.model_dump_json(indent=2, exclude_unset=True) + "\n"
+
+
+class PatchPart(Part):
+    """The kerfs of one patch of a coupon; x of cuts along y, y of cuts along x."""
+
+    name: str
+    power_percent: float
+    speed_mm_s: float
+    passes: int
+    kerf_x_mm: float = Field(description="Kerf at the front, as in a material's file.")
+    kerf_x_back_mm: float
+    kerf_x_sigma_mm: float
+    kerf_y_mm: float
+    kerf_y_back_mm: float
+    kerf_y_sigma_mm: float
+
+
+class KerfDocument(Document):
+    """What ``kerf`` measured."""
+
+    format: Literal["cmp-kerf"] = "cmp-kerf"
+    version: Literal[2] = 2
+    from_back: bool = Field(description="The picture shows the sheet's back.")
+    face: Literal["front", "back"] = Field(description="The face whose openings are seen.")
+    taper_deg: float
+    taper_assumed: bool
+    thickness_mm: float
+    response: str
+    scale_px_mm: float = Field(description="Scale, px per mm.")
+    fit_mm: float = Field(description="RMS residual of the coupon's marks.")
+    patches: tuple[PatchPart, ...]
+
+
+class CalibratePatternDocument(Document):
+    """The result of ``calibrate pattern``."""
+
+    format: Literal["cmp-calibration-pattern"] = "cmp-calibration-pattern"
+    version: Literal[1] = 1
+    written: str
+    pictures: int
+    side: Literal["front", "back"]
+    present: int = Field(description="Markers that are visible in the layout.")
+    measured: int
+    residual_z: float = Field(description="Residuals in stated deviations; 1 is right.")
+    worst_picture: int = Field(description="Number of the picture with the largest residuals, from 0.")
+    worst_picture_z: float
+    worst_picture_rms_px: float
+    scatter_mm: float = Field(description="Scatter of the markers around their nominal places, per axis.")
+    deviation_mm: float = Field(description="Standard deviation of a measured place, per axis.")

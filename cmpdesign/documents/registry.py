@@ -1,0 +1,55 @@
+"""The documents by the commands that print them, and their JSON Schemas."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Union
+
+from pydantic import TypeAdapter
+
+from cmpdesign.documents import calibration, data, designs, reading, runs
+from cmpdesign.documents.document import Document, Message
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.names import nearest_name
+
+EXPERIMENTS = ("precision", "response", "reliability", "angles", "designs")
+# The words of a command -> the documents that it prints; schema prints a JSON Schema itself.
+DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
+    "templates": (designs.TemplatesDocument, designs.TemplateDocument),
+    "init": (designs.InitDocument,),
+    "size": (designs.SizeDocument,),
+    "build": (designs.BuildDocument,),
+    "check": (designs.CheckDocument,),
+    "render": (runs.RenderDocument,),
+    "verify": (reading.VerifyDocument,),
+    "track": (runs.TrackDocument, runs.RecoverDocument),
+    "reconstruct": (runs.ReconstructDocument, runs.RecoverDocument),
+    "dataset": (data.DatasetDocument,),
+    "extract": (data.DatasetDocument,),
+    "kerf": (reading.KerfDocument,),
+    "calibrate camera": (calibration.CalibrateCameraDocument,),
+    "calibrate pattern": (reading.CalibratePatternDocument,),
+    "export lerobot": (runs.ExportDocument,),
+    "export zarr": (runs.ExportDocument,),
+    **{f"evaluate {name}": (runs.EvaluateDocument,) for name in EXPERIMENTS},
+    "message": (Message,),
+}
+
+
+def document_schema_text(command: str) -> str:
+    """The JSON Schema of what a command prints with ``--json``, or of "message".
+
+    Raises:
+        CmpDesignError: no such command.
+    """
+    models = DOCUMENTS.get(command)
+    if models is None:
+        known = ", ".join(DOCUMENTS)
+        raise CmpDesignError(
+            f"schema {command}: no command with a document of its own{nearest_name(command, DOCUMENTS)}; "
+            f"there are {known}"
+        )
+    schema = TypeAdapter(Union[models]).json_schema()  # type: ignore[arg-type]  # noqa: UP007
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,184 @@
+"""Documents of the commands that run from a source, and of the commands that export runs."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from cmpdesign.documents.document import Document, Part
+from cmpdesign.documents.reading import QualityPart
+
+
+class FramesPart(Part):
+    """Numbers of frames."""
+
+    declared: int | None = Field(description="Number of frames that the source states; null where unknown.")
+    read: int
+    tracked: int
+    lost: int = Field(description="Frames without a pattern.")
+    unreadable: int
+    other_size: int
+
+
+class SharesPart(Part):
+    """Shares of markers by their status, over all frames."""
+
+    measured: float
+    repaired: float
+    lost: float
+
+
+class RestPart(Part):
+    """The rest frame."""
+
+    markers: int
+    mm_per_px: float | None
+    residual_mm: float | None
+
+
+class LargestPart(Part):
+    """The largest displacement of a run."""
+
+    px: float | None = None
+    mm: float | None
+    frame: int
+    marker: int
+
+
+class LivePart(Part):
+    """The counts of a live server."""
+
+    address: str
+    sent: int = Field(description="Sent frames.")
+    left_out: int = Field(description="Frames that could not be sent in time.")
+    is_viewer_behind: bool = Field(
+        description="True if a viewer received fewer messages than the server sent."
+    )
+    failure: str = Field(description="Why the server stopped before the end.")
+
+
+class TimesPart(Part):
+    """How the times of the frames were found."""
+
+    of: Literal["names", "numbers", "index", "table", "video", "camera", "arrival", "none"]
+    text: str
+    began: str | None = Field(description="When time_s was 0, UTC.")
+    began_unix_s: float | None
+    began_of: Literal["names", "table", "file", "clock"] | None = Field(
+        description="file: the time of creation of a video, in whole seconds; some phones write its end."
+    )
+    camera_clock_s: float | None = Field(description="The camera's own clock when time_s was 0.")
+
+
+class TrackDocument(Document):
+    """The summary of ``track``; also the file FILE.summary.json."""
+
+    format: Literal["cmp-tracking"] = "cmp-tracking"
+    version: Literal[1] = 1
+    source: str
+    pattern: str
+    digest: str = Field(description="Of the layout.")
+    ended_early: str | None = Field(description="Why the run ended early.")
+    frames: FramesPart
+    reasons: dict[str, int] = Field(
+        description="Why frames are not tracked, or tracked in part -> number of frames."
+    )
+    starts: dict[str, int] = Field(description="How the numbering was found -> number of frames.")
+    marker_shares: SharesPart
+    time_ms: dict[str, float] = Field(description="Percentiles of the time of a frame.")
+    frames_per_s: float | None
+    rest: RestPart | None
+    quality: QualityPart | None = Field(description="Medians over the frames.")
+    jitter_px: float | None = Field(
+        description="Scatter of a marker at rest, per axis; null with too few resting frames."
+    )
+    jitter_pairs: int
+    largest_displacement: LargestPart | None
+    times: TimesPart
+    live: LivePart | None = Field(None, description="With --live.")
+    written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
+
+
+class ViewPart(Part):
+    """One view of a rig."""
+
+    name: str
+    position_mm: tuple[float, float, float]
+    rms_px: float = Field(description="RMS residual of the view's pose at rest.")
+
+
+class PositionsPart(Part):
+    """The surface to which the positions belong."""
+
+    of: Literal["pattern"]
+    depth_mm: float | None = Field(description="Depth of the pattern below the touched surface.")
+    continued_to_surface: bool
+
+
+class ReconstructDocument(Document):
+    """The summary of ``reconstruct``; also the file FILE.summary.json."""
+
+    format: Literal["cmp-reconstruction"] = "cmp-reconstruction"
+    version: Literal[1] = 1
+    source: str
+    pattern: str
+    digest: str = Field(description="Of the layout.")
+    ended_early: str | None
+    frames: FramesPart
+    reasons: dict[str, int]
+    marker_shares: SharesPart
+    lost_markers: dict[str, int] = Field(description="Why markers have no position -> number of markers.")
+    sigma_um: tuple[float, ...] | None = Field(description="Median standard deviations in x, y and z.")
+    time_ms: dict[str, float]
+    views: tuple[ViewPart, ...]
+    model_px: float
+    warnings: tuple[str, ...]
+    positions: PositionsPart
+    largest_displacement: LargestPart | None
+    times: TimesPart
+    live: LivePart | None = Field(None, description="With --live.")
+    written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
+
+
+class RecoverDocument(Document):
+    """What ``track --recover`` and ``reconstruct --recover`` completed."""
+
+    format: Literal["cmp-recovery"] = "cmp-recovery"
+    version: Literal[1] = 1
+    written: str | None = Field(description="Null where no complete frame was found.")
+    frames: int
+    problems: tuple[str, ...]
+
+
+class RenderDocument(Document):
+    """What ``render`` drew."""
+
+    format: Literal["cmp-rendering"] = "cmp-rendering"
+    version: Literal[1] = 1
+    written: tuple[str, ...]
+    size_px: tuple[int, int] = Field(description="Width and height of the picture.")
+    frames: int
+    fps: float | None = Field(description="Frames per second of a sequence.")
+    visible: tuple[int, ...] | None = Field(description="Visible markers, by view; null for a sequence.")
+
+
+class ExportDocument(Document):
+    """What ``export`` wrote."""
+
+    format: Literal["cmp-export"] = "cmp-export"
+    version: Literal[1] = 1
+    kind: Literal["lerobot", "zarr"]
+    written: str
+    episodes: int
+    frames: int
+    fps: float | None = Field(description="Frames per second of a LeRobot data set.")
+
+
+class EvaluateDocument(Document):
+    """The files of ``evaluate``, and the document of report.json, whose figures differ by experiment."""
+
+    format: Literal["cmp-evaluation-run"] = "cmp-evaluation-run"
+    version: Literal[1] = 1
+    written: tuple[str, ...]
+    report: dict[str, object] = Field(description="As in report.json: format cmp-evaluation, version 1.")
