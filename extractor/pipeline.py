@@ -35,6 +35,7 @@ from extractor.layout.topology import topology_of
 from extractor.numbering.ink_fields import Palette
 from extractor.numbering.lattice_walk import Walk, cell_light, count_holes, walk_cells
 from extractor.numbering.marker_places import InitialMarkers, MeasuredCells, merge_corners
+from extractor.numbering.missing_cells import with_missing_cells
 from extractor.numbering.registration import Numbering, Refusal, Registration
 from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
@@ -226,10 +227,10 @@ class Extractor:
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (cells, mesh, _, _), numbering = found
-        corners = fit_edges(pyramid.level(1), without_swelling(cells, mesh), numbering.cell >= 0)
-        corners = stages.record("triangles", corners)
-        measured = MeasuredCells(cells.center_px, corners)
-        places = stages.record("place", merge_corners(measured, numbering, self._lattice))
+        triangles = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
+        corners = stages.record("triangles", fit_edges(pyramid.level(1), triangles.corner_px))
+        measured = MeasuredCells(triangles.corner_px.mean(axis=1), corners)
+        places = stages.record("place", merge_corners(measured, triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
     def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:

@@ -39,17 +39,14 @@ def without_swelling(cells: Cells, mesh: CellMesh) -> NDArray[np.float64]:
     return center + (cells.corner_px - center) / mesh.swelling
 
 
-def fit_edges(
-    view: PyramidLevel, corner_px: NDArray[np.float64], chosen: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def fit_edges(view: PyramidLevel, corner_px: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 3, 2) the corners by the edges as the image shows them; NaN where no triangle is measured.
 
     Args:
         view: the image at full scale.
         corner_px: (N, 3, 2) clockwise in the image.
-        chosen: (N,) bool, the triangles to measure.
     """
-    corners, good = corner_px.copy(), chosen.copy()
+    corners, good = corner_px.copy(), np.ones(len(corner_px), np.bool_)
     update_triangle_corners(view, corners, good)
     corners[~good] = np.nan
     return corners

@@ -19,7 +19,8 @@ from extractor.image.response import light_of_values
 from extractor.numbering.lattice_walk import WalkedCells
 from extractor.result import Reason
 
-SWAPPED_LEAD = 0.3  # of the naming, between a mirrored view and swapped channels; chosen
+# of the misfits of a mirrored view and of swapped channels, the smaller one to the larger one; chosen
+MAX_MISFIT_RATIO = 0.7
 LEAST_PALETTE_SHARE = 0.02  # of the light of an ink in a channel; chosen
 
 
@@ -103,12 +104,18 @@ class Palette:
         )
 
     def other_side_reason(self, shares: NDArray[np.float64]) -> Reason:
-        """Why the inks are in the order of another side than stated: by the palette, or by it with swapped channels."""
-        as_is = self.naming(shares, other_side=True).max()
-        swapped = self.naming(shares[:, ::-1]).max()
-        if abs(as_is - swapped) < SWAPPED_LEAD:
+        """Why the inks are in the order of another side than stated: a mirrored view has the palette's shares as they are,
+        an image with swapped channels has them swapped."""
+        as_is, swapped = self._misfit(shares, other_side=True), self._misfit(shares[:, ::-1], other_side=False)
+        if min(as_is, swapped) > MAX_MISFIT_RATIO * max(as_is, swapped):
             return Reason.OTHER_SIDE
-        return Reason.MIRRORED if as_is > swapped else Reason.SWAPPED_CHANNELS
+        return Reason.MIRRORED if as_is < swapped else Reason.SWAPPED_CHANNELS
+
+    def _misfit(self, shares: NDArray[np.float64], other_side: bool) -> float:
+        """The mean difference of the log shares from the palette's by the best naming."""
+        t = int(self.naming(shares, other_side).argmax())
+        ordered = shares[((-1 if other_side else 1) * (np.arange(3) - t)) % 3]
+        return float(np.abs(ordered - np.log(self._shares)).mean())
 
 
 def ink_fields(view: PyramidLevel, cells: WalkedCells, light: NDArray[np.float64], part: int) -> InkFields:

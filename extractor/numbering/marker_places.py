@@ -11,7 +11,7 @@ from extractor._native import numbering as native
 from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.affine_maps import LIMITS as MAP_LIMITS
 from extractor.localmap.affine_maps import AffineMapLimits
-from extractor.numbering.registration import Numbering
+from extractor.numbering.missing_cells import NumberedTriangles
 
 AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend; chosen
 # in edges, between a marker's place by its gridlines and a correct initial place; chosen
@@ -67,7 +67,9 @@ class MeasuredCells(NamedTuple):
     corner_px: NDArray[np.float64]
 
 
-def merge_corners(cells: MeasuredCells, numbering: Numbering, lattice: Lattice) -> InitialMarkers:
+def merge_corners(
+    cells: MeasuredCells, numbering: NumberedTriangles, lattice: Lattice
+) -> InitialMarkers:
     """Merge the corners at each marker (eq. 4: at most one red, green and blue).
 
     A cell's corners are those of its triangle where the triangle agrees with the prediction by the cell's neighbours,

@@ -18,7 +18,7 @@ from extractor._native import numbering as native
 from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
-from extractor.layout.lattice_tables import Lattice
+from extractor.layout.lattice_tables import Lattice, cells_at
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.result import Origin, Reason
@@ -27,6 +27,7 @@ MIN_LAYOUT_SHARE = 0.06  # of the layout's cells, of a part that gives the origi
 MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; chosen
 MAX_PARTS = 4  # that are tried for the origin, the largest; chosen
 NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
+MIN_CLASS_FIT = 0.55  # of the classes to the colors; two inks that look alike have two thirds. Chosen
 SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
 MAX_BRIGHT = 12  # bright places that are looked at; with more of them none is evidence. Chosen
 MAX_TIED = 24  # motions between which the other parts may decide; chosen, for time
@@ -205,6 +206,7 @@ class _Placed(NamedTuple):
     part: int
     cells: WalkedCells
     fields: InkFields
+    white_axial: NDArray[np.int32]  # (W, 2) of the white triangles
     motions: Motions
     mirrored: bool
 
@@ -262,6 +264,8 @@ class Registration:
         mirrored = bool(self._mirrored)
         walked = image.seen_from(mirrored)
         fields = ink_fields(image.view, walked, image.light, part)
+        if class_fit(fields, walked, part) < MIN_CLASS_FIT:
+            return Refusal(Reason.NO_PATTERN, fields)
         own, other = self._palette.naming(fields.shares), self._palette.naming(fields.shares, other_side=True)
         lead = float(other.max() - own.max())
         if self._mirrored is None and lead > 0.0:
@@ -275,9 +279,10 @@ class Registration:
             return Refusal(self._palette.other_side_reason(fields.shares), fields)
         naming = NAMING_WEIGHT * (own - own.max())
         axial = np.ascontiguousarray(walked.axial[walked.part == part])
-        white = white_odds(fields.whiteness, white_triangles(walked, part, fields))
+        triangles = white_triangles(walked, part, fields)
+        white = white_odds(fields.whiteness, triangles)
         found = native.register_part(axial, naming, fields.down_axial, white, self._layout, WITNESSES)
-        return _Placed(part, walked, fields, Motions(*found), mirrored)
+        return _Placed(part, walked, fields, fields.down_axial[triangles], Motions(*found), mirrored)
 
     def _with_all_parts(self, image: _WalkedImage, placed: _Placed) -> _Placed | None:
         """The part with a certain motion, if the other parts decide between its best motions; None if they do not.
@@ -295,6 +300,18 @@ class Registration:
         decided = placed._replace(motions=chosen)
         return decided if decided.lead >= JOINT_LEAD else None
 
+    def _has_second_white(self, placed: _Placed) -> bool:
+        """Whether a white triangle lies at a black cell of the layout: another pad's reference."""
+        turn, dq, dr = (int(v) for v in placed.motions.motion[0])
+        for q, r in placed.white_axial.tolist():
+            for _ in range(turn):
+                q, r = -q - r, q - 1
+            q, r = q + dq, r + dr
+            beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
+            if (q, r) != (0, 0) and (beside >= 0).all():
+                return True
+        return False
+
     def _placed_cells(self, placed: _Placed, number: int) -> NDArray[np.int32]:
         """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
         own = placed.cells.part == placed.part
@@ -310,6 +327,8 @@ class Registration:
 
     def _number_with(self, image: _WalkedImage, placed: _Placed, others: list[int]) -> Numbering | Refusal:
         """The numbers of all cells, by the part whose motion is certain."""
+        if self._has_second_white(placed):
+            return Refusal(Reason.SEVERAL_PADS, placed.fields)
         cell = self._placed_cells(placed, 0)
         for part in others:
             if (cell[image.walk.part == part] >= 0).any():
@@ -319,6 +338,13 @@ class Registration:
                 return Refusal(Reason.SEVERAL_PADS, placed.fields)
         origin = Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
         return Numbering(cell, placed.mirrored, origin, placed.lead, placed.fields)
+
+
+def class_fit(fields: InkFields, cells: WalkedCells, part: int) -> float:
+    """The share of a part's cells whose color is the likeliest for their own class; a third by chance."""
+    own = cells.part == part
+    classes = (cells.axial[own, 0] - cells.axial[own, 1]) % 3
+    return float((fields.odds[own][np.arange(len(classes)), classes] == 0.0).mean())
 
 
 def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bool_]:

@@ -5,6 +5,7 @@
 #include "numbering/lattice_walk.hpp"
 #include "numbering/link_inks.hpp"
 #include "numbering/marker_places.hpp"
+#include "numbering/missing_cells.hpp"
 #include "numbering/part_attachment.hpp"
 #include "numbering/registration.hpp"
 
@@ -20,6 +21,7 @@ void add_numbering(nb::module_ module) {
   bind<&moved_cells>(module, "moved_cells", {"axial", "turn", "dq", "dr", "cell_lookup"});
   bind<&attach_parts>(module, "attach_parts",
                       {"cells", "cell", "odds", "layout", "axial", "cell_lookup", "limits"});
+  bind<&missing_cells>(module, "missing_cells", {"center", "cell", "layout", "limits"});
   bind<&merge_corners>(module, "merge_corners",
                        {"cells", "numbers", "layout", "corner_ids", "markers", "limits"});
 }
