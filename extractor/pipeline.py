@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.cells.cell_mesh import CellMesh, build_cell_mesh
-from extractor.cells.cells import EFFORTS, Cells, Effort, find_cells
+from extractor.cells.cells import EFFORTS, Cells, Effort, find_cells, has_color
 from extractor.cells.region_growing import grow
 from extractor.cells.triangle_fit import fit_edges, regions_as_cells, without_swelling
 from extractor.complete.image_quality import (
@@ -34,7 +34,7 @@ from extractor.layout.reference import Reference
 from extractor.layout.topology import topology_of
 from extractor.numbering.ink_fields import Palette
 from extractor.numbering.lattice_walk import Walk, cell_light, count_holes, walk_cells
-from extractor.numbering.marker_places import InitialMarkers, MeasuredCells, merge_corners
+from extractor.numbering.marker_places import InitialMarkers, merge_corners
 from extractor.numbering.missing_cells import with_missing_cells
 from extractor.numbering.registration import Numbering, Refusal, Registration
 from extractor.presets import PRESETS, Preset
@@ -228,9 +228,8 @@ class Extractor:
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (cells, mesh, _, _), numbering = found
         triangles = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
-        corners = stages.record("triangles", fit_edges(pyramid.level(1), triangles.corner_px))
-        measured = MeasuredCells(triangles.corner_px.mean(axis=1), corners)
-        places = stages.record("place", merge_corners(measured, triangles, self._lattice))
+        triangles = stages.record("triangles", triangles.measured(fit_edges(pyramid.level(1), triangles.corner_px)))
+        places = stages.record("place", merge_corners(triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
     def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:
@@ -280,11 +279,14 @@ class Extractor:
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
         """Stages 2 to 7 at the coarsest scale, and with the least effort, that numbers the cells; else the reason where
         most cells were found."""
-        failed = Unnumbered(Refusal(Reason.NO_PATTERN))
+        smallest = pyramid.level(_recognition_scales(pyramid.size)[0]).image
+        failed = Unnumbered(Refusal(Reason.NO_PATTERN if has_color(smallest) else Reason.NO_COLOR))
         for scale in _recognition_scales(pyramid.size):
             view = pyramid.level(scale)
+            cells = None
             for effort in EFFORTS:
-                found = self._find_cells(view, effort, stages)
+                found = self._find_cells(view, cells, effort, stages)
+                cells = found.cells
                 is_last = effort is EFFORTS[-1]
                 if is_last and found.is_small(view):
                     break
@@ -293,12 +295,14 @@ class Extractor:
                 numbering = stages.record("number", self._registration.number(view, *found))
                 if not isinstance(numbering, Refusal):
                     return NumberedCells(found, numbering)
-                if failed.found is None or found.count >= failed.found.count:
+                if numbering.reason != Reason.NO_PATTERN or failed.refusal.reason == Reason.NO_PATTERN:
                     failed = Unnumbered(numbering, found)
         return failed
 
-    def _find_cells(self, view: PyramidLevel, effort: Effort, stages: Stages) -> FoundCells:
-        cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort))
+    def _find_cells(
+        self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages
+    ) -> FoundCells:
+        cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort, before))
         mesh = stages.record("mesh", build_cell_mesh(cells))
         light = stages.record("light", cell_light(view, cells, mesh))
         walk = stages.record("walk", walk_cells(mesh, light))

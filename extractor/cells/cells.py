@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from extractor._native import cells as native
 from extractor.image.pyramid import PyramidLevel
 
+MIN_SPREAD = 12  # between the channels of a colored pixel, gray levels; chosen
+COLORED_SHARE = 0.002  # of an image that is not gray; chosen
 MIN_TILE_PX = 6  # of the tiles of local levels; chosen
 MAX_TILE_PX = 24
 
@@ -83,7 +85,8 @@ class Effort(NamedTuple):
 # Most images show every cell in a channel of its own; the others are looked at closely. Chosen, for time.
 EFFORTS = (
     Effort(3, np.array([0.5])),
-    Effort(7, np.array([0.15, 0.22, 0.32, 0.42, 0.5, 0.6, 0.72, 0.85])),
+    Effort(7, np.array([0.32, 0.5, 0.65])),
+    Effort(7, np.array([0.15, 0.22, 0.42, 0.58, 0.72, 0.85])),
 )
 
 
@@ -111,18 +114,30 @@ class Cells:
         return math.sqrt(float(np.median(self.area_px)) * 4.0 / math.sqrt(3.0)) if len(self.area_px) else 0.0
 
 
-def find_cells(view: PyramidLevel, largest_edge_px: float, effort: Effort) -> Cells:
+def has_color(image: NDArray[np.uint8]) -> bool:
+    """Whether some pixels of an image (H, W, 3) have a color: others than gray, black and white."""
+    spread = image.max(axis=2) - image.min(axis=2)
+    return bool(np.count_nonzero(spread >= MIN_SPREAD) > COLORED_SHARE * spread.size)
+
+
+def find_cells(
+    view: PyramidLevel, largest_edge_px: float, effort: Effort, before: Cells | None = None
+) -> Cells:
     """The regions that may be cells.
 
     Args:
         view: the image at the scale of recognition.
         largest_edge_px: edges, at full scale, of a pattern that fills the image; sizes the tiles of local levels.
         effort: maps and levels.
+        before: regions that were found with less effort.
     """
     scale = view.scale
     tile_px = int(min(max(0.5 * largest_edge_px / scale, MIN_TILE_PX), MAX_TILE_PX))
-    nothing = (np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3, 2)), np.zeros(0), np.zeros(0))
+    known = (np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3, 2)), np.zeros(0), np.zeros(0))
+    if before is not None:
+        corners = view.to_level(before.corner_px)
+        known = (view.to_level(before.center_px), before.area_px / scale**2, corners, before.quality, before.share)
     center, area, corner, quality, share = native.find_candidates(
-        np.ascontiguousarray(view.image), 0, effort.maps, effort.shares, *nothing, LIMITS._replace(tile_px=tile_px)
+        np.ascontiguousarray(view.image), 0, effort.maps, effort.shares, *known, LIMITS._replace(tile_px=tile_px)
     )
     return Cells(view.to_full_scale(center), area * scale**2, view.to_full_scale(corner), quality, share)

@@ -55,33 +55,18 @@ class InitialMarkers(NamedTuple):
     is_intact: NDArray[np.bool_]
 
 
-class MeasuredCells(NamedTuple):
-    """The cells of an image with their measured triangles.
-
-    Attributes:
-        center_px: (N, 2) float64.
-        corner_px: (N, 3, 2) float64, clockwise in the image; NaN where no triangle is measured.
-    """
-
-    center_px: NDArray[np.float64]
-    corner_px: NDArray[np.float64]
-
-
-def merge_corners(
-    cells: MeasuredCells, numbering: NumberedTriangles, lattice: Lattice
-) -> InitialMarkers:
+def merge_corners(cells: NumberedTriangles, lattice: Lattice) -> InitialMarkers:
     """Merge the corners at each marker (eq. 4: at most one red, green and blue).
 
     A cell's corners are those of its triangle where the triangle agrees with the prediction by the cell's neighbours,
     else the predicted ones.
 
     Args:
-        cells: the cells of the image.
-        numbering: their numbers.
+        cells: the numbered cells of the image.
         lattice: the layout.
 
     Returns:
         The markers before refinement.
     """
     tables = lattice.layout_cells, lattice.corner_ids, len(lattice.marker_mm)
-    return InitialMarkers(*native.merge_corners(cells, numbering, *tables, LIMITS))
+    return InitialMarkers(*native.merge_corners(cells, cells, *tables, LIMITS))

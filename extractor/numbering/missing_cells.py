@@ -31,14 +31,26 @@ class NumberedTriangles(NamedTuple):
     """Numbered cells with the triangles from which their edges are measured.
 
     Attributes:
-        corner_px: (N, 3, 2) float64, clockwise in the image.
+        center_px: (N, 2) float64.
+        corner_px: (N, 3, 2) float64, clockwise in the image; NaN where no triangle is measured.
         cell: (N,) int32, the layout's cell.
         mirrored: the pattern is seen from its back.
+        found: the number of cells that were found; those behind are predicted.
     """
 
+    center_px: NDArray[np.float64]
     corner_px: NDArray[np.float64]
     cell: NDArray[np.int32]
     mirrored: bool
+    found: int
+
+    def measured(self, corner_px: NDArray[np.float64]) -> NumberedTriangles:
+        """The cells with measured corners (N, 3, 2), NaN where there are none; predicted cells need them."""
+        kept = np.isfinite(corner_px[:, 0, 0])
+        kept[: self.found] = True
+        return NumberedTriangles(
+            self.center_px[kept], corner_px[kept], self.cell[kept], self.mirrored, self.found
+        )
 
 
 def with_missing_cells(
@@ -57,6 +69,7 @@ def with_missing_cells(
     found, predicted = native.missing_cells(center, cell, lattice.layout_cells, LIMITS)
     if not numbering.mirrored:  # the layout's order is clockwise in images of the back
         predicted = predicted[:, ::-1]
+    corners = np.concatenate([corners, predicted])
     return NumberedTriangles(
-        np.concatenate([corners, predicted]), np.concatenate([cell, found]), numbering.mirrored
+        corners.mean(axis=1), corners, np.concatenate([cell, found]), numbering.mirrored, len(cell)
     )

@@ -28,9 +28,11 @@ MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; 
 MAX_PARTS = 4  # that are tried for the origin, the largest; chosen
 NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
 MIN_CLASS_FIT = 0.55  # of the classes to the colors; two inks that look alike have two thirds. Chosen
+MIN_SIDE_FIT = 0.8  # the same, of a pattern whose side is refused; chosen
 SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
 MAX_BRIGHT = 12  # bright places that are looked at; with more of them none is evidence. Chosen
 MAX_TIED = 24  # motions between which the other parts may decide; chosen, for time
+OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
 JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
 ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
@@ -63,6 +65,7 @@ class WhiteLimits(NamedTuple):
         white_is_bright: probability that the white cell is bright. Chosen.
         white_is_dark: log odds against a dark place. Chosen.
         is_triangle: more log odds for a bright place with the triangle of a down-cell. Chosen.
+        max_without_triangle: log odds of any other bright place; a drop and glare are bright, too. Chosen.
         center_reach: in edges, from a down-cell's place to the center of this triangle. Chosen.
         corner_reach: in edges, between its corners and those of a cell turned around. Chosen.
     """
@@ -72,6 +75,7 @@ class WhiteLimits(NamedTuple):
     white_is_bright: float = 0.9
     white_is_dark: float = -3.0
     is_triangle: float = 3.0
+    max_without_triangle: float = 3.0
     center_reach: float = 0.3
     corner_reach: float = 0.4
 
@@ -206,14 +210,15 @@ class _Placed(NamedTuple):
     part: int
     cells: WalkedCells
     fields: InkFields
-    white_axial: NDArray[np.int32]  # (W, 2) of the white triangles
     motions: Motions
     mirrored: bool
+    other_whites: int  # white triangles at black cells of the layout by the best motion
 
     @property
     def lead(self) -> float:
         scores = self.motions.score
-        return float(scores[0] - scores[1]) if len(scores) > 1 else np.inf
+        lead = float(scores[0] - scores[1]) if len(scores) > 1 else np.inf
+        return lead - OTHER_WHITE * self.other_whites
 
     @property
     def is_certain(self) -> bool:
@@ -264,7 +269,8 @@ class Registration:
         mirrored = bool(self._mirrored)
         walked = image.seen_from(mirrored)
         fields = ink_fields(image.view, walked, image.light, part)
-        if class_fit(fields, walked, part) < MIN_CLASS_FIT:
+        fit = class_fit(fields, walked, part)
+        if fit < MIN_CLASS_FIT:
             return Refusal(Reason.NO_PATTERN, fields)
         own, other = self._palette.naming(fields.shares), self._palette.naming(fields.shares, other_side=True)
         lead = float(other.max() - own.max())
@@ -273,16 +279,36 @@ class Registration:
             walked = image.seen_from(mirrored)
             fields = ink_fields(image.view, walked, image.light, part)
             own = self._palette.naming(fields.shares)
-        if self._mirrored is None and abs(lead) < SIDE_LEAD:
-            return Refusal(Reason.OTHER_SIDE, fields)
-        if self._mirrored is not None and lead > SIDE_LEAD:
-            return Refusal(self._palette.other_side_reason(fields.shares), fields)
+        is_other = abs(lead) < SIDE_LEAD if self._mirrored is None else lead > SIDE_LEAD
+        if is_other and fit < MIN_SIDE_FIT:
+            return Refusal(Reason.NO_PATTERN, fields)
+        if is_other:
+            known = self._mirrored is not None
+            reason = self._palette.other_side_reason(fields.shares) if known else Reason.OTHER_SIDE
+            return Refusal(reason, fields)
         naming = NAMING_WEIGHT * (own - own.max())
         axial = np.ascontiguousarray(walked.axial[walked.part == part])
         triangles = white_triangles(walked, part, fields)
         white = white_odds(fields.whiteness, triangles)
         found = native.register_part(axial, naming, fields.down_axial, white, self._layout, WITNESSES)
-        return _Placed(part, walked, fields, fields.down_axial[triangles], Motions(*found), mirrored)
+        motions = Motions(*found)
+        return _Placed(
+            part, walked, fields, motions, mirrored, self._other_whites(fields.down_axial[triangles], motions)
+        )
+
+    def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
+        """The number of white triangles (W, 2) that the best motion carries to black cells of the layout."""
+        if len(motions.score) == 0:
+            return 0
+        turn, dq, dr = (int(v) for v in motions.motion[0])
+        count = 0
+        for q, r in white_axial.tolist():
+            for _ in range(turn):
+                q, r = -q - r, q - 1
+            q, r = q + dq, r + dr
+            beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
+            count += (q, r) != (0, 0) and bool((beside >= 0).all())
+        return count
 
     def _with_all_parts(self, image: _WalkedImage, placed: _Placed) -> _Placed | None:
         """The part with a certain motion, if the other parts decide between its best motions; None if they do not.
@@ -300,18 +326,6 @@ class Registration:
         decided = placed._replace(motions=chosen)
         return decided if decided.lead >= JOINT_LEAD else None
 
-    def _has_second_white(self, placed: _Placed) -> bool:
-        """Whether a white triangle lies at a black cell of the layout: another pad's reference."""
-        turn, dq, dr = (int(v) for v in placed.motions.motion[0])
-        for q, r in placed.white_axial.tolist():
-            for _ in range(turn):
-                q, r = -q - r, q - 1
-            q, r = q + dq, r + dr
-            beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
-            if (q, r) != (0, 0) and (beside >= 0).all():
-                return True
-        return False
-
     def _placed_cells(self, placed: _Placed, number: int) -> NDArray[np.int32]:
         """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
         own = placed.cells.part == placed.part
@@ -327,8 +341,6 @@ class Registration:
 
     def _number_with(self, image: _WalkedImage, placed: _Placed, others: list[int]) -> Numbering | Refusal:
         """The numbers of all cells, by the part whose motion is certain."""
-        if self._has_second_white(placed):
-            return Refusal(Reason.SEVERAL_PADS, placed.fields)
         cell = self._placed_cells(placed, 0)
         for part in others:
             if (cell[image.walk.part == part] >= 0).any():
@@ -386,7 +398,7 @@ def white_odds(whiteness: NDArray[np.float64], is_triangle: NDArray[np.bool_]) -
     others = max(int(bright.sum()) - 1, 0)
     is_bright = np.log(WHITE.white_is_bright * (known.sum() + 1.0) / (others + 0.5))
     dark = known & (whiteness < WHITE.dark)
-    is_bright = is_bright + np.where(is_triangle, WHITE.is_triangle, 0.0)
+    is_bright = np.where(is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
     return np.where(known, np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0)), np.nan)
 
 
@@ -394,6 +406,9 @@ def _uncertain_reason(placed: _Placed) -> Reason:
     """Why a part has no certain motion."""
     white = placed.motions.white
     close = placed.motions.score > placed.motions.score[0] - LEAD if len(white) else np.zeros(0, bool)
+    whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites
+    if whites > 1:
+        return Reason.SEVERAL_PADS
     return Reason.AMBIGUOUS if np.count_nonzero(white[close] > 0.0) > 1 else Reason.REFERENCE_LOST
 
 
