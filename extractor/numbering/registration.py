@@ -102,9 +102,8 @@ class AttachmentLimits(NamedTuple):
         known_cells: placed cells through which a map goes. Chosen.
         judged_cells: cells of a part by which its motion is judged, those nearest to placed ones. Chosen.
         max_rounds: passes over all parts. Chosen.
-        max_places: tried for a cell; with more the map is too uncertain. Chosen.
-        reach: in edges, of the places that are tried for a cell, beyond the nearest. Derived: the next places of
-            the lattice.
+        stiffness: of the prior's terms, in the map that looks for places. Chosen.
+        reach: in edges, of the places that are tried for a cell, beyond the nearest. Chosen.
         max_corner_misfit: in edges, between a cell's corners and those of the map; a triangle that points the other way
             has 1.15. Chosen.
         max_misfit: mean log likelihood of the judged cells of an accepted part. Chosen.
@@ -114,11 +113,11 @@ class AttachmentLimits(NamedTuple):
     """
 
     prior: MapPrior = MapPrior()
-    known_cells: int = 24
+    known_cells: int = 36
     judged_cells: int = 16
     max_rounds: int = 6
-    max_places: int = 80
-    reach: float = 1.8
+    stiffness: float = 0.1
+    reach: float = 3.2
     max_corner_misfit: float = 0.6
     max_misfit: float = 8.0
     outside_odds: float = -12.5

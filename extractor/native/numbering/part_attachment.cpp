@@ -57,6 +57,7 @@ class PlacedCells {
 // The map through the placed cells around a part.
 struct Support {
   LocalMap map;
+  LocalMap stiff;     // the same with little bending, to look for places across a gap
   double edge_px;
   double misfit;      // of the placed cells alone
   std::int32_t near;  // the layout's cell of the nearest placed cell
@@ -166,15 +167,17 @@ class Attachment {
     const auto near = placed.nearest(x(i), y(i), limits_.known_cells);
     const Index u = placed.of_layout(near[0]);
     const double edge_px = edge_of(placed.of_image(near[0]));
-    Support out{LocalMap({layout_.center_mm(u, 0), layout_.center_mm(u, 1), layout_.size_mm[u], placed.x(near[0]),
-                          placed.y(near[0]), edge_px},
-                         limits_.prior),
-                edge_px, 0.0, static_cast<std::int32_t>(u)};
+    const MapFrame frame{layout_.center_mm(u, 0), layout_.center_mm(u, 1), layout_.size_mm[u],
+                         placed.x(near[0]),       placed.y(near[0]),       edge_px};
+    const localmap::MapPrior stiff{limits_.prior.noise, limits_.prior.quadratic * limits_.stiffness,
+                                   limits_.prior.cubic * limits_.stiffness};
+    Support out{LocalMap(frame, limits_.prior), LocalMap(frame, stiff), edge_px, 0.0, static_cast<std::int32_t>(u)};
     for (const Index n : near) {
       const Index v = placed.of_layout(n);
       out.map.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
+      out.stiff.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
     }
-    if (!out.map.solve()) return std::nullopt;
+    if (!out.map.solve() || !out.stiff.solve()) return std::nullopt;
     out.misfit = out.map.misfit();
     return out;
   }
@@ -184,7 +187,7 @@ class Attachment {
     const double vx = corner(2, 0) - corner(0, 0), vy = corner(2, 1) - corner(0, 1);
     return std::max(std::sqrt(std::abs(ux * vy - uy * vx) * 2.0 / std::sqrt(3.0)), 1e-3);
   }
-  // The layout's cells that may be cell i: those near to its place by the map, as far as the map is certain.
+  // The layout's cells that may be cell i: those near to its place by the stiff map.
   std::vector<std::int32_t> places_near(Index i, const Support& support) {
     ++search_;
     std::vector<std::int32_t> near{support.near};
@@ -197,7 +200,6 @@ class Attachment {
       least = std::min(least, here);
       if (here > least + limits_.reach) continue;
       out.push_back(near[n]);
-      if (static_cast<std::int64_t>(out.size()) > limits_.max_places) return {};  // the map is too uncertain
       for (Index k = 0; k < layout_.cell_neighbours.size(1); ++k) {
         const std::int32_t next = layout_.cell_neighbours(near[n], k);
         if (next < 0 || seen_[next] == search_) continue;
@@ -207,11 +209,10 @@ class Attachment {
     }
     return out;
   }
-  // From the place of a layout's cell by the map to a cell of the image, in edges, less the map's deviation.
+  // From the place of a layout's cell by the stiff map to a cell of the image, in edges.
   double distance_to(const Support& support, std::int32_t u, Index i) const {
-    const MappedPoint point = support.map.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
-    const double distance = std::hypot(point.x - x(i), point.y - y(i)) - 2.0 * std::sqrt(point.variance);
-    return std::max(distance, 0.0) / support.edge_px;
+    const MappedPoint point = support.stiff.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
+    return std::hypot(point.x - x(i), point.y - y(i)) / support.edge_px;
   }
   Motion motion_to(Index i, std::int32_t u, std::int32_t turn) const {
     const AxialStep turned = turned_up({cells_.axial(i, 0), cells_.axial(i, 1)}, turn);

@@ -11,12 +11,12 @@ namespace cmp::numbering {
 // The limits of attachment; the Python module explains them.
 struct AttachmentLimits {
   localmap::MapPrior prior;
-  std::int64_t known_cells, judged_cells, max_rounds, max_places;
-  double reach, max_corner_misfit, max_misfit, outside_odds, margin, margin_of_misfit;
+  std::int64_t known_cells, judged_cells, max_rounds;
+  double stiffness, reach, max_corner_misfit, max_misfit, outside_odds, margin, margin_of_misfit;
 
   template <class F>
   static AttachmentLimits read(const F& f) {
-    return {f["prior"], f["known_cells"],       f["judged_cells"], f["max_rounds"], f["max_places"],
+    return {f["prior"], f["known_cells"],       f["judged_cells"], f["max_rounds"], f["stiffness"],
             f["reach"], f["max_corner_misfit"], f["max_misfit"],   f["outside_odds"], f["margin"],
             f["margin_of_misfit"]};
   }
