@@ -5,6 +5,7 @@
 #include "numbering/marker_places.hpp"
 #include "numbering/mesh_parts.hpp"
 #include "numbering/outline_fit.hpp"
+#include "numbering/pad_code.hpp"
 #include "numbering/small_pattern.hpp"
 #include "numbering/white_search.hpp"
 
@@ -24,6 +25,8 @@ void add_numbering(nb::module_ module) {
                            {"center_px", "cell", "layout", "mirrored", "limits"});
   bind<&merge_corners>(module, "merge_corners",
                        {"cells", "numbers", "layout", "corner_ids", "markers", "limits"});
+  bind<&code_motions>(module, "code_motions",
+                      {"axial", "bit", "board", "least_inside", "are_inks_known", "most"});
 }
 
 }  // namespace cmp::numbering
