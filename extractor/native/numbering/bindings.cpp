@@ -1,11 +1,11 @@
 // Room "numbering" for Python.
 #include "base/binding.hpp"
-#include "numbering/pad_code.hpp"
 
 #include "numbering/lattice_walk.hpp"
 #include "numbering/marker_places.hpp"
 #include "numbering/mesh_parts.hpp"
 #include "numbering/outline_fit.hpp"
+#include "numbering/pad_code.hpp"
 #include "numbering/small_pattern.hpp"
 #include "numbering/white_search.hpp"
 

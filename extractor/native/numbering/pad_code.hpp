@@ -18,8 +18,8 @@ struct CodeBoard {
   }
 };
 
-// The best motions, the best first: (K, 3) turns by 120 degrees about marker 0, and shifts of q and r; wrong (K,),
-// how many known cells differ from the layout, outside of which all is black.
+// The best motions, the best first: (K, 3) turns by 120 degrees about marker 0, and shifts of q and r; wrong
+// (K,), how many known cells differ from the layout, outside of which all is black.
 using CodeMotions = std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 1>>;
 
 // Motions of D down-cells: those that carry `least_inside` of them into the layout.
