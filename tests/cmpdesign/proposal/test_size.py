@@ -31,7 +31,11 @@ def test_the_design_fits_the_view_and_has_no_finding(camera: str, view: str, err
 
 
 @pytest.mark.parametrize(
-    ("camera", "view", "noise"), [((640, 480), (40.0, 30.0), 2.0), ((480, 360), (60.0, 40.0), 4.0)]
+    ("camera", "view", "noise"),
+    [
+        pytest.param((640, 480), (40.0, 30.0), 2.0, marks=pytest.mark.slow),
+        ((480, 360), (60.0, 40.0), 4.0),
+    ],
 )
 def test_the_error_that_is_measured_is_the_predicted_one(
     camera: tuple[int, int], view: tuple[float, float], noise: float

@@ -101,7 +101,7 @@ def test_an_open_mesh_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         make_meshes(design, build_layout(design))
 
 
-@pytest.mark.parametrize("crown", ["sphere", "cylinder"])
+@pytest.mark.parametrize("crown", [pytest.param("sphere", marks=pytest.mark.slow), "cylinder"])
 def test_crowned_meshes_are_closed(crown: str) -> None:
     design = load("honeycomb", {"layers": "2", "mold.crown": crown, "mold.crown_radius_mm": "15"})
     stack = make_stack(design, build_layout(design))
