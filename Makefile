@@ -44,7 +44,7 @@ $(READY): pyproject.toml $(LOCK)
 	@$(PYTHON) -m venv .venv
 	@$(PIP) $(BUILD_NEEDS) $(ZIG)
 	@# An older .venv has another distribution of OpenCV; two in one environment overwrite each other.
-	@$(BIN)/python -m pip uninstall --quiet --yes --disable-pip-version-check opencv-contrib-python-headless 2>/dev/null
+	@$(BIN)/python -m pip uninstall --quiet --yes --disable-pip-version-check opencv-python-headless 2>/dev/null
 	@$(TOOLCHAIN) PATH=$(CURDIR)/$(BIN):$$PATH $(PIP) --no-build-isolation --editable '.[dev]'
 	@# Only the path: the build backend's finder would take the packages from here also in copies of the checkout.
 	@sed -i.old '/^import /d' .venv/lib/python*/site-packages/_editable_skbc_cmpdesign.pth
@@ -72,9 +72,9 @@ lint: $(READY) $(CORE)
 	@$(BIN)/mypy examples
 
 bench: $(READY) $(CORE)
-	@set -e; for name in extraction accuracy comparison datasets; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done
+	@set -e; for name in extraction accuracy comparison datasets photoreal; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done
 	@$(BIN)/python -m docs.figures
-	@set -e; for name in startup numbering tracking rendering contact large_strain reconstruction medium laser kerf molds stress damage calibration camera codecs live; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
+	@set -e; for name in startup numbering tracking rendering contact large_strain reconstruction medium laser kerf molds stress damage calibration camera codecs live sweeps views; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
 
 figures: $(READY) $(CORE)
 	@$(BIN)/python -m docs.figures

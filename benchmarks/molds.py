@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.support.machine import conditions_text, write_json
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.patterns.colors import RED
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.solids.measure import measure_solid
@@ -67,7 +67,7 @@ def time_call(operation: Callable[[], Any]) -> tuple[float, Any]:
 
 def red_plate_slab(layers: int) -> Slab:
     """The slab of the boss plate of the red cells."""
-    design = load_design("honeycomb", {"layers": str(layers)})
+    design = load("honeycomb", {"layers": str(layers)})
     parts = make_parts(make_stack(design, build_layout(design)))
     slab = next(part.slab for part in parts if part.color_number == RED)
     assert slab is not None

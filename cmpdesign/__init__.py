@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
     from cmpdesign.api.designs import load as load
-    from cmpdesign.api.designs import load_design as load_design
     from cmpdesign.api.designs import schema as schema
     from cmpdesign.api.designs import templates as templates
     from cmpdesign.api.layouts import Layout as Layout
@@ -89,7 +88,6 @@ _HOMES = {
     "kerf": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
     "load": "cmpdesign.api.designs",
-    "load_design": "cmpdesign.api.designs",
     "load_run": "cmpdesign.api.sequences",
     "load_scene": "cmpdesign.api.pictures",
     "open_source": "cmpdesign.api.sequences",

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 
 class CmpDesignError(Exception):
     """Base of every error that cmpdesign raises on purpose; the command line prints it on one line."""
@@ -17,3 +21,27 @@ class InputError(CmpDesignError, ValueError):
 
 class OutputError(CmpDesignError, OSError):
     """A file or folder that could not be written. Its previous content is unchanged."""
+
+
+def _as_argument(name: str, value: str | None) -> str:
+    return name if value is None else f"{name}={value!r}"
+
+
+_SPELLING: ContextVar[Callable[[str, str | None], str]] = ContextVar("spelling", default=_as_argument)
+
+
+def parameter(name: str, value: str | None = None) -> str:
+    """A parameter of a call as the caller writes it: ``fps`` and ``side='back'``; ``--fps`` and ``--side back`` for a
+    caller on the command line.
+    """
+    return _SPELLING.get()(name, value)
+
+
+@contextmanager
+def spelled(spelling: Callable[[str, str | None], str]) -> Iterator[None]:
+    """Within this context, ``spelling`` writes the names of parameters."""
+    token = _SPELLING.set(spelling)
+    try:
+        yield
+    finally:
+        _SPELLING.reset(token)

@@ -25,6 +25,7 @@ EXTRAS = {
     "print": "sheets to print",
     "evaluate": "contact, error bounds, size, experiments, plots",
     "parquet": "tables as Parquet",
+    "video": "videos and network streams read",
     "recording": "recordings for ROS 2 and Foxglove",
     "export": "data sets for LeRobot and Diffusion Policy",
     "live": "frames shown in Foxglove during a run",
@@ -36,14 +37,14 @@ EXTRAS = {
 _DISTRIBUTIONS = {
     "OCP": "cadquery-ocp-novtk",
     "PIL": "pillow",
-    "cv2": "opencv-python-headless",
+    "cv2": "opencv-contrib-python-headless",
     "foxglove": "foxglove-sdk",
     "rerun": "rerun-sdk",
 }
 # Distributions that bring OpenCV; the first is required. Each suffices; two in one environment overwrite each other.
 OPENCV_DISTRIBUTIONS = (
-    "opencv-python-headless",
     "opencv-contrib-python-headless",
+    "opencv-python-headless",
     "opencv-python",
     "opencv-contrib-python",
 )

@@ -25,7 +25,7 @@ from build123d import (
     offset,
 )
 
-from cmpdesign import load_design
+from cmpdesign import load
 from cmpdesign.products.mold.cad import pad_parts
 
 CLEARANCE_MM, WALL_MM, LEDGE_MM, FLANGE_MM, CHAMBER_MM, SCREW_MM = 0.2, 3.0, 1.5, 3.0, 20.0, 3.2
@@ -33,7 +33,7 @@ CLEARANCE_MM, WALL_MM, LEDGE_MM, FLANGE_MM, CHAMBER_MM, SCREW_MM = 0.2, 3.0, 1.5
 
 def sensor(template: str) -> Compound:
     """The housing and the pad of a design; z = 0 is the pad's back, the camera is below the pad."""
-    pad = pad_parts(load_design(template))
+    pad = pad_parts(load(template))
     size, top = pad.bounding_box().size, pad.children[-1].faces().sort_by(Axis.Z)[-1]
     wide, deep, edge = size.X + 2 * WALL_MM, size.Y + 2 * WALL_MM, size.X / 2 + WALL_MM + SCREW_MM
 

@@ -126,7 +126,7 @@ class Extractor:
     Args:
         layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
             a layout of cmpdesign.
-        preset: "fast", "balanced" or "accurate".
+        preset: "balanced" or "accurate".
         response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
             of the light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
         side: the side of the pattern that images show: "front", "back", or "designed": the side that the layout's

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-Preset = Literal["fast", "balanced", "accurate"]
-PRESETS: tuple[Preset, ...] = ("fast", "balanced", "accurate")
+Preset = Literal["balanced", "accurate"]
+PRESETS: tuple[Preset, ...] = ("balanced", "accurate")
 
 
 class Schedule(NamedTuple):
@@ -25,7 +25,6 @@ class Schedule(NamedTuple):
 
 
 SCHEDULES: dict[Preset, Schedule] = {
-    "fast": Schedule(2, 0.5, 0.5),
     "balanced": Schedule(6, 0.5, 0.25),
     "accurate": Schedule(8, 1.2, 0.1),
 }

@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from cmpdesign import build_layout, load_design, write_layout
+from cmpdesign import build_layout, load, write_layout
 from cmpdesign.scene import (
     Blob,
     Camera,
@@ -45,7 +45,7 @@ TEMPLATES = ("digit", "elliptical", "gelsight-mini", "honeycomb", "round", "squa
 PRODUCTS = "svg,layout,preview,laser,print,report"
 SOLIDS = ("digit", "round", "tac3d")  # molds and meshes of one crown, one round and one plain pad
 PATTERNS = ("honeycomb", "round", "elliptical")
-PRESETS = ("fast", "balanced", "accurate")
+PRESETS = ("balanced", "accurate")
 
 
 def digest(value: Any) -> str:
@@ -82,7 +82,7 @@ def builds(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def scenes(pattern: str, layers: int) -> dict[str, Scene]:
-    layout = build_layout(load_design(pattern, {"layers": str(layers)}))
+    layout = build_layout(load(pattern, {"layers": str(layers)}))
     camera = Camera(pitch_px=20, rotation_deg=7.3, tilt_deg=12)
     noisy = Sensor(noise=2)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from tests.extractor.test_golden import FILES, FOLDER, read
 
-PRESETS = ("fast", "balanced", "accurate")
+PRESETS = ("balanced", "accurate")
 
 
 def main() -> None:

@@ -8,21 +8,25 @@ from pathlib import Path
 from rich.console import Console
 
 
-def publishing_parser(name: str, document: str | None, quick: str) -> argparse.ArgumentParser:
-    """The options of ``python -m benchmarks.NAME`` of a benchmark whose figures the documentation shows.
+def publishing_parser(
+    name: str, document: str | None, quick: str, publish: bool = True
+) -> argparse.ArgumentParser:
+    """The options of ``python -m benchmarks.NAME``.
 
     Args:
         name: of the benchmark.
         document: its docstring, whose first line is the description.
         quick: the items of which a quick run has few.
+        publish: the documentation shows the figures.
     """
     description = (document or "").split("\n")[0]
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=description)
     parser.add_argument("--quick", action="store_true", help=f"few {quick}: a look, no figures to quote")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results too")
-    parser.add_argument(
-        "--publish", action="store_true", help="write docs/measured and the pages that show it"
-    )
+    if publish:
+        parser.add_argument(
+            "--publish", action="store_true", help="write docs/measured and the pages that show it"
+        )
     return parser
 
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api.layouts import Layout, build_layout
 from cmpdesign.design.design import Design as Parameters
-from cmpdesign.design.design import design_schema
-from cmpdesign.design.design import load_design as load_parameters
+from cmpdesign.design.design import design_schema, load_design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.checks import CAMERA_PX
 from cmpdesign.products.building import Built, Checked, build_files, check_products
@@ -157,12 +156,7 @@ def load(
     >>> load("honeycomb", pitch_mm="60mil", layers=3)
     <Design 'honeycomb': honeycomb, pitch_mm=1.524, layers=3>
     """
-    return Design.of(load_parameters(name_or_path, {**(overrides or {}), **changes}))
-
-
-def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Design:
-    """``load`` under its name in version 0.1."""
-    return load(name_or_path, overrides)
+    return Design.of(load_design(name_or_path, {**(overrides or {}), **changes}))
 
 
 def schema() -> dict[str, Any]:

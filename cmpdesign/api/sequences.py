@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from cmpdesign.api.layouts import reference_from
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import CmpDesignError, OutputError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.live.options import Live, LiveKind
 from cmpdesign.tracking.recording.options import DEFAULT_FRAME_ID, Recording
+from cmpdesign.tracking.shape_options import ShapeOptions as ShapeOptions
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from extractor.pipeline import Side
     from extractor.presets import Preset
 
-Watch = Callable[[Any], None]
 AnySource = str | Path | int | Sequence[str | Path]
 
 
@@ -46,6 +46,7 @@ class ReadingOptions(TypedDict, total=False):
         with_images: also record the frames' images, or show them live; False.
         live: also show the frames during the run, by "foxglove" or "rerun"; None.
         live_port, live_wait_s: see ``Live``; None and 0.
+        times: times of pictures by "names" or "index", or a file .csv of FRAME,SECONDS; None: what the names say.
     """
 
     fps: float | None
@@ -61,6 +62,7 @@ class ReadingOptions(TypedDict, total=False):
     live: LiveKind | None
     live_port: int | None
     live_wait_s: float
+    times: str | None
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ class Reading:
     live: LiveKind | None = None
     live_port: int | None = None
     live_wait_s: float = 0.0
+    times: str | None = None
 
     def __post_init__(self) -> None:
         _require_positive("fps", self.fps)
@@ -98,11 +101,12 @@ class Reading:
     @property
     def viewer(self) -> Live | None:
         """The live server's options."""
-        if self.live is None:
-            if self.live_port is not None or self.live_wait_s:
-                raise CmpDesignError("--live-port and --live-wait need --live")
-            return None
-        return Live(self.live, self.live_port, self.live_wait_s)
+        if self.live is not None:
+            return Live(self.live, self.live_port, self.live_wait_s)
+        if self.live_port is not None or self.live_wait_s:
+            port, wait, needed = map(parameter, ("live_port", "live_wait_s", "live"))
+            raise CmpDesignError(f"{port} and {wait} need {needed}")
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +137,7 @@ def track(
     mm_per_px: float | None = None,
     overlay: str | Path | None = None,
     quiver: str | Path | None = None,
-    watch: Watch = lambda frame: None,
+    watch: Callable[[Any], None] = lambda frame: None,
     **reading: Unpack[ReadingOptions],
 ) -> Followed:
     """Follow a pattern through a video, a folder or a camera into a table, as the command ``track`` does.
@@ -179,7 +183,7 @@ def reconstruct(
     source: str | Path | int | Sequence[str | Path | int],
     output: str | Path,
     *,
-    watch: Watch = lambda frame: None,
+    watch: Callable[[Any], None] = lambda frame: None,
     shape: ShapeOptions | None = None,
     **reading: Unpack[ReadingOptions],
 ) -> Followed:
@@ -214,7 +218,9 @@ def reconstruct(
     return follow(job, watch)
 
 
-def open_source(source: AnySource, fps: float | None = None, max_pixels: int = MOST_PIXELS) -> FrameSource:
+def open_source(
+    source: AnySource, fps: float | None = None, max_pixels: int = MOST_PIXELS, times: str | None = None
+) -> FrameSource:
     """Open a source of frames.
 
     >>> tracker = extractor.Tracker("layout.json")
@@ -226,13 +232,14 @@ def open_source(source: AnySource, fps: float | None = None, max_pixels: int = M
             number, a stream ("rtsp://..."), or a sequence of pictures, folders and patterns.
         fps: frames per second of a folder (default 30), or instead of a video's own rate.
         max_pixels: largest frame that is read, width x height.
+        times: see ``ReadingOptions``.
 
     Raises:
         SourceError: the source cannot be opened.
     """
     from cmpdesign.tracking import sources
 
-    return sources.open_source(_texts(source), fps, max_pixels)
+    return sources.open_source(_texts(source), fps, max_pixels, times)
 
 
 def load_run(path: str | Path) -> Run:
@@ -244,32 +251,6 @@ def load_run(path: str | Path) -> Run:
     from cmpdesign.tracking.export.runs import read_run
 
     return read_run(Path(path))
-
-
-@dataclass(frozen=True)
-class ShapeOptions:
-    """Options of ``reconstruct`` that concern the surface.
-
-    Attributes:
-        from_rest: place all views by the rest frame, also the views whose pose the rig gives.
-        flatness_mm: standard deviation of the markers from the plane at rest.
-        model_px: error of the camera model; None: from the rest frame.
-        surface: also give the touched surface, by the [elastomer] of the rig.
-
-    Raises:
-        CmpDesignError: a length that is negative or not finite.
-    """
-
-    from_rest: bool = False
-    flatness_mm: float = 0.0
-    model_px: float | None = None
-    surface: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("flatness_mm", "model_px"):
-            value = getattr(self, name)
-            if value is not None and not 0 <= value < float("inf"):
-                raise CmpDesignError(f"{name} is {value:g}; expected a number from 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,11 +293,13 @@ class TrackJob:
         if self.rest is not None:
             at_rest = read_rest_markers(self.rest, source, how.fps, new_tracker(), how.max_pixels)
         tracker = new_tracker(rest=at_rest, mm_per_px=self.mm_per_px)
-        frames = open_source(source, how.fps, how.max_pixels)
+        frames = open_source(source, how.fps, how.max_pixels, how.times)
         video = None
         if self.overlay is not None:
             video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
-        outputs = open_outputs(self.output, TrackTable(tracker), how.recording, how.viewer)
+        outputs = open_outputs(
+            self.output, TrackTable(tracker, lambda: frames.times), how.recording, how.viewer
+        )
         statistics = TrackStatistics(self.layout)
         return TrackingRun(frames, tracker, outputs.sink, statistics, video, how.frames, live=outputs.live)
 
@@ -379,10 +362,12 @@ class ReconstructJob:
             model_px=shape.model_px,
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
-        source = open_sources(self.source, how.fps, how.max_pixels)
+        source = open_sources(self.source, how.fps, how.max_pixels, how.times)
         is_one_a_view = len(split_list(self.source)) > 1
         recording = replace(how.recording, views=rig.views, is_image_one_a_view=is_one_a_view)
-        outputs = open_outputs(self.output, ShapeTable(reconstructor, continuation), recording, how.viewer)
+        outputs = open_outputs(
+            self.output, ShapeTable(reconstructor, continuation, lambda: source.times), recording, how.viewer
+        )
         tracker = ShapeTracker(
             reconstructor,
             warm=not how.cold,
@@ -435,7 +420,7 @@ class ReconstructJob:
 Job = TrackJob | ReconstructJob
 
 
-def follow(job: Job, watch: Watch) -> Followed:
+def follow(job: Job, watch: Callable[[Any], None]) -> Followed:
     """Follow a source to its end and write the summary; after a failure the summary covers the frames so far.
 
     Raises:
@@ -462,6 +447,7 @@ def write_summary(run: TrackingRun, job: Job) -> Followed:
     if not run.statistics.frames:
         return Followed(job.output, (job.output,), {}, run.ended_early, run.warnings)
     summary = job.summary(run)
+    summary["times"] = run.source.times.to_json()
     if run.live is not None:
         summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
     # Tables of several formats in one folder have a summary each.
@@ -486,7 +472,7 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 
 def _require_positive(name: str, value: float | None) -> None:
     if value is not None and not 0 < value < float("inf"):
-        raise CmpDesignError(f"{name} is {value:g}; expected a number above 0")
+        raise CmpDesignError(f"{parameter(name)} is {value:g}; expected a number above 0")
 
 
 def _texts(source: AnySource) -> tuple[str, ...]:

@@ -159,7 +159,7 @@ def run_experiment(
         seed: seed of all random values.
         workers: processes; None: one for each core.
         sensor: name of a sensor template, or a TOML file.
-        preset: the reader's preset: "fast", "balanced" or "accurate".
+        preset: the reader's preset: "balanced" or "accurate".
 
     Returns:
         The JSON object of report.json.

@@ -21,7 +21,7 @@ from cmpdesign.cli.terminal import (
     print_origin,
     shortened,
 )
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, spelled
 from cmpdesign.inputs.texts import visible
 from cmpdesign.libraries import missing_library_text
 
@@ -72,7 +72,14 @@ class Command(TyperCommand):
                 raise CmpDesignError(
                     f"{parameter.opts[-1]} -: standard input and output are not supported; give a name"
                 )
-        return super().invoke(ctx)
+        with spelled(self._spelled):
+            return super().invoke(ctx)
+
+    def _spelled(self, name: str, value: str | None) -> str:
+        """A parameter as the command line writes it; a word of another command for what this command does not have."""
+        written = {each.name: each.opts[-1] for each in self.params if each.opts[-1].startswith("--")}
+        option = written.get(name, f"--{name.replace('_', '-')}")
+        return option if value is None else f"{option} {value}"
 
 
 class Group(TyperGroup):

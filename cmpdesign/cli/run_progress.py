@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmpdesign.cli.progress import progress_bar
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say, say_text
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
     from cmpdesign.tracking.live.view import LiveCount
     from cmpdesign.tracking.run import TrackingRun
+    from cmpdesign.tracking.sources import FrameSource
 
 EXIT_NOT_TRACKED = 1
 
@@ -29,6 +31,7 @@ def run_with_progress(run: TrackingRun, doing: str) -> None:
     """
     from cmpdesign.tracking.run import stop_on_signal
 
+    _say_times(run.source)
     total = run.limit if run.limit is not None else run.source.total
     if run.live is not None:
         say(f"live at {run.live.address}")
@@ -38,6 +41,14 @@ def run_with_progress(run: TrackingRun, doing: str) -> None:
     finally:
         if run.live is not None:
             _report_live(run.live.count())
+
+
+def _say_times(source: FrameSource) -> None:
+    """The first line of a run: how the times of the frames are found; of a live source the last one tells it."""
+    if source.times.is_doubtful:
+        print_warning(f"{source.name}: {source.times.text}")
+    elif not source.is_live:
+        say_text(f"{visible(source.name)}: {source.times.text}\n")
 
 
 def _report_live(count: LiveCount) -> None:
@@ -66,6 +77,8 @@ def exit_status(run: TrackingRun) -> int:
         return 0 if run.source.is_live else EXIT_INTERRUPTED
     if not run.statistics.frames:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
+    if run.source.is_live:
+        say_text(f"{run.source.times.text}\n")
     if run.ended_early:
         print_warning(f"{run.ended_early}; the frames until then are written")
     return EXIT_NOT_TRACKED if run.ended_early or not run.statistics.tracked else 0

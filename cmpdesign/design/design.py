@@ -152,7 +152,7 @@ class Design(_StrictModel):
         if all(given):
             return (
                 "pitch_mm, layers and an overall size (width_mm, height_mm) fix the size twice; "
-                "leave one of the three out (a value of a template by --set layers=none)"
+                "leave one of the three out (a value of a template by layers=none)"
             )
         if sum(given) == 2 or (self.pitch_mm is not None and self.clip != "none"):
             return ""
@@ -198,7 +198,7 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None
 
     Args:
         name_or_path: a template's name ("tac3d") or the path of a TOML file.
-        overrides: field -> value, or a text as after ``--set``. "palette.red" names a field of a table. None and the
+        overrides: field -> value, or a text as ``--set`` takes it. "palette.red" names a field of a table. None and the
             text "none" remove the field.
 
     Raises:

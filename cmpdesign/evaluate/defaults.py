@@ -9,4 +9,4 @@ from types import MappingProxyType
 USUAL_TRIALS: Mapping[str, int] = MappingProxyType(
     {"precision": 10, "response": 10, "reliability": 300, "angles": 1, "designs": 5}
 )
-PRESETS = ("fast", "balanced", "accurate")
+PRESETS = ("balanced", "accurate")

@@ -21,9 +21,11 @@ from cmpdesign.inputs.files import is_regular_file, path_exists, read_file
 
 JOURNAL_NAME = "journal.jsonl"
 JOURNAL_VERSION = 2
-# Packages and modules that the results of trials depend on.
+# Packages and modules that the results of trials depend on; of the compiled loops, the files that are loaded.
 HASHED_PACKAGES = (
     "extractor",
+    "extractor._native",
+    "cmpdesign._native",
     "cmpdesign.evaluate",
     "cmpdesign.scene",
     "cmpdesign.contact",
@@ -43,7 +45,7 @@ def fingerprint(conditions: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=1)
 def code_digest() -> str:
-    """SHA-256 (hex) of the Python files of ``HASHED_PACKAGES``, names and content."""
+    """SHA-256 (hex) of the files of ``HASHED_PACKAGES`` that run, names and content."""
     digest = hashlib.sha256()
     for package in HASHED_PACKAGES:
         for name, path in _source_files(package):
@@ -54,7 +56,7 @@ def code_digest() -> str:
 
 
 def _source_files(package: str) -> Iterator[tuple[str, Path]]:
-    """Names and paths of the Python files of a package or of a single module; none if it is not installed."""
+    """Names and paths of the Python files of a package, or of a single module of any kind; none if not installed."""
     spec = find_spec(package)
     if spec is None:
         return

@@ -22,7 +22,8 @@ _READERS: Mapping[bytes, tuple[str, str]] = {
     b"P5": ("PpmImagePlugin", "PpmImageFile"),
     b"P6": ("PpmImagePlugin", "PpmImageFile"),
 }
-_TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
+_TIFF_KIND, _TIFF_WIDTH, _TIFF_HEIGHT, _TIFF_PHOTOMETRIC, _DNG_VERSION = 254, 256, 257, 262, 50706
+_RAW_PHOTOMETRIC = (32803, 34892)  # mosaic of color filters; linear raw
 _ODD = (
     OSError,
     ValueError,
@@ -60,8 +61,34 @@ def size_in_header(data: bytes) -> tuple[int, int] | None:
     return _tiff_size(data) if data.startswith((b"II*\0", b"MM\0*")) else None
 
 
+def pictures_in_file(data: bytes) -> int:
+    """The number of pictures: pages of a TIFF, frames of an animated PNG or WebP; 1 where it is not stated."""
+    header = open_header(data)
+    with suppress(*_ODD), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return int(getattr(header, "n_frames", 1))
+    return 1
+
+
+def is_raw_of_camera(data: bytes) -> bool:
+    """True for a TIFF whose pixels, or whose first page's larger sibling, are a camera's raw values (DNG, NEF, ...)."""
+    if not data.startswith((b"II*\0", b"MM\0*")):
+        return False
+    tags = _tiff_tags(data)
+    is_preview = bool(int(tags.get(_TIFF_KIND, 0)) & 1)
+    return _DNG_VERSION in tags or is_preview or tags.get(_TIFF_PHOTOMETRIC) in _RAW_PHOTOMETRIC
+
+
 def _tiff_size(data: bytes) -> tuple[int, int] | None:
     """The size of a TIFF file whose kind of pixels Pillow does not know."""
+    tags = _tiff_tags(data)
+    with suppress(*_ODD):
+        return int(tags[_TIFF_WIDTH]), int(tags[_TIFF_HEIGHT])
+    return None
+
+
+def _tiff_tags(data: bytes) -> Mapping[int, Any]:
+    """The tags of the first page; none of a damaged file."""
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
     with suppress(*_ODD), warnings.catch_warnings():
@@ -69,5 +96,5 @@ def _tiff_size(data: bytes) -> tuple[int, int] | None:
         tags, file = ImageFileDirectory_v2(data[:8]), io.BytesIO(data)
         file.seek(tags.next)
         tags.load(file)
-        return int(tags[_TIFF_WIDTH]), int(tags[_TIFF_HEIGHT])
-    return None
+        return dict(tags)
+    return {}

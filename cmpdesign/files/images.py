@@ -8,12 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError, InputError
-from cmpdesign.files.image_header import size_in_header
+from cmpdesign.errors import CmpDesignError, InputError, parameter
+from cmpdesign.files.image_header import is_raw_of_camera, pictures_in_file, size_in_header
+from cmpdesign.inputs.file_kinds import HEAD_BYTES, RAW, describe_file, is_raw_picture
 from cmpdesign.inputs.files import MOST_PIXELS, open_file, read_file
+from cmpdesign.inputs.sources import has_jpeg_end
 
 SMALLEST_PX = 16
 _HEADER_BYTES = 1 << 16
+_TAIL_BYTES = 4096
+_JPEG_STREAMS = (".mjpeg", ".mjpg")
+_FEWEST_BITS, _MOST_BITS = 8, 14  # of a camera's values in a file of 16 bits
 PNG_PIXELS_PER_BYTE = 8 * 1032  # at most: one bit a pixel, and deflate makes no more than 1032 bytes of one
 _NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
 # Endings of images that are written -> largest number of bits.
@@ -31,7 +36,8 @@ class ImageFileError(CmpDesignError, ValueError):
 def read_image(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool = False) -> Image:
     """Read the pixels of an image file.
 
-    An alpha channel is dropped. A rotation in EXIF is not applied, because the sensor's pixels are measured.
+    An alpha channel is dropped. A rotation in EXIF is not applied, because the sensor's pixels are measured;
+    ``cv2.imread`` applies it. Values of 10 to 14 bits in a file of 16 bits are scaled, see ``full_range``.
 
     Args:
         path: a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM file.
@@ -49,7 +55,12 @@ def read_image(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool =
 
 
 def is_image_file(path: str | Path) -> bool:
-    """True if a file begins like an image that ``read_image`` knows; False also for a file that cannot be read."""
+    """True if a file begins like an image that ``read_image`` knows; False also for a file that cannot be read.
+
+    A bare stream of JPEGs begins like one JPEG; it is known by its name.
+    """
+    if Path(path).suffix.lower() in _JPEG_STREAMS:
+        return False
     try:
         with open_file(path) as file:
             return size_in_header(file.read(_HEADER_BYTES)) is not None
@@ -82,16 +93,26 @@ def decode_bytes(data: bytes, path: str | Path, most_pixels: int = MOST_PIXELS) 
         raise ImageFileError(f"{path} is empty; expected an image")
     size = size_in_header(data)
     if size is None:
-        raise ImageFileError(f"{path}: {_NO_IMAGE}")
+        raise ImageFileError(f"{path}: {_NO_IMAGE}{_described(path)}")
+    if is_raw_picture(path, data[:HEAD_BYTES]) or is_raw_of_camera(data):
+        raise ImageFileError(f"{path}: {_NO_IMAGE}; {RAW}")
+    if (count := pictures_in_file(data)) > 1:
+        raise ImageFileError(
+            f"{path}: holds {count} pictures; expected one a file: save them one by one, or as a video"
+        )
     if size[0] * size[1] > most_pixels:
         raise ImageFileError(
             f"{path}: is {size[0]} x {size[1]} px, {size[0] * size[1] / 1e6:.4g} megapixels; the limit is "
-            f"{most_pixels / 1e6:.4g}; make it smaller, or raise the limit where the command has --max-pixels"
+            f"{most_pixels / 1e6:.4g}; make it smaller, or raise {parameter('max_pixels')}"
         )
     if data.startswith(b"\x89PNG") and size[0] * size[1] > PNG_PIXELS_PER_BYTE * len(data):
         raise ImageFileError(
             f"{path}: {_NO_IMAGE}; it claims {size[0]} x {size[1]} px, which {len(data)} bytes cannot hold"
         )
+    if (data.startswith(b"\x89PNG") and b"IEND" not in data[-_TAIL_BYTES:]) or (
+        data.startswith(b"\xff\xd8") and not has_jpeg_end(data)
+    ):
+        raise ImageFileError(f"{path}: is cut off: its end is missing; copy the file again")
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except (cv2.error, MemoryError):  # OpenCV refuses to decode: too many pixels, or an unknown type
@@ -116,7 +137,37 @@ def _to_bgr(pixels: NDArray[Any], path: Path, gray: bool) -> Image:
         return np.ascontiguousarray(np.repeat(pixels.reshape(height, width, 1), 3, axis=2))
     if channels < 3:
         raise ImageFileError(f"{path} is a grayscale image; a multicolor pattern needs color (3 channels)")
-    return np.ascontiguousarray(pixels[:, :, :3])
+    return full_range(np.ascontiguousarray(pixels[:, :, :3]))
+
+
+def full_range(pixels: Image) -> Image:
+    """A picture of 16 bits with the whole range, of a camera with fewer bits.
+
+    Cameras write 10 to 14 bits into the lower or into the upper bits. The bits that all values leave 0 are found, and
+    the others are scaled to 0 ... 65535, so that a clipped value is 65535 again. A dark picture becomes brighter, by a
+    factor; light that is linear stays linear.
+    """
+    if pixels.dtype != np.uint16:
+        return pixels
+    used = int(np.bitwise_or.reduce(pixels, axis=None))
+    if not used:
+        return pixels
+    top, bottom = max(used.bit_length(), _FEWEST_BITS), (used & -used).bit_length() - 1
+    if top > _MOST_BITS and bottom < 16 - _MOST_BITS:
+        return pixels
+    bottom = min(bottom, top - _FEWEST_BITS)
+    largest = (1 << (top - bottom)) - 1
+    scaled = (pixels >> bottom).astype(np.uint32) * 65535
+    return ((scaled + largest // 2) // largest).astype(np.uint16)
+
+
+def _described(path: str | Path) -> str:
+    """What a file is that is no image, as "; it is a zip archive: ..."; empty where that is not known."""
+    try:
+        text = describe_file(path)
+    except InputError:
+        return ""
+    return f"; {text}" if text else ""
 
 
 def require_color_picture(pixels: object) -> Image:

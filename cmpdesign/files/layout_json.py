@@ -1,4 +1,4 @@
-"""Writing of ``layout.json``, version 1: columns, mm, UTF-8, the same bytes for the same layout. See docs/."""
+"""Writing of ``layout.json``: columns, mm, UTF-8, the same bytes for the same layout. See docs/."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cmpdesign.files.atomic import write_file
 from cmpdesign.layout.layout import AsMade, Layout
 from cmpdesign.patterns.colors import COLORS
 
-FORMAT, VERSION = "cmp-layout", 1
+FORMAT = "cmp-layout"
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:
@@ -35,7 +35,7 @@ def layout_document(layout: Layout) -> dict[str, Any]:
     """The JSON object of the layout file."""
     document: dict[str, Any] = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": file_version(layout),
         "units": "mm",
         "pattern": layout.pattern,
         "parameters": dict(layout.parameters),
@@ -69,6 +69,11 @@ def layout_document(layout: Layout) -> dict[str, Any]:
     return document
 
 
+def file_version(layout: Layout) -> int:
+    """2 for a layout with a field that version 1 does not know, else 1, so that earlier readers read the file."""
+    return 2 if layout.cell_height_mm else 1
+
+
 def pattern_digest(layout: Layout) -> str:
     """SHA-256 (hex) of the content of the layout file without the program's version."""
     lines = layout_to_json(layout).splitlines()
@@ -88,6 +93,8 @@ def _as_made_object(as_made: AsMade) -> dict[str, Any]:
             name: [None if math.isnan(value) else value for value in column]
             for name, column in columns.items()
         }
+    if as_made.cell_height_mm:
+        found["cell_height_mm"] = as_made.cell_height_mm
     return found
 
 

@@ -6,16 +6,19 @@
 from __future__ import annotations
 
 import glob
+import os
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
-from cmpdesign.errors import CmpDesignError
-from cmpdesign.inputs.files import is_folder, path_exists
+from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.inputs.files import is_folder, is_regular_file, open_file, path_exists
+from cmpdesign.inputs.frame_names import in_order_of_names
 
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"})
+_TAIL_BYTES = 4096
 _ADDRESS = re.compile(r"(rtsp|rtsps|rtmp|http|https|udp|tcp)://", re.IGNORECASE)
 
 
@@ -39,14 +42,17 @@ class NamedSource:
     Attributes:
         kind: kind of the source.
         name: the texts, for messages; without the password of an address.
-        paths: the files of ``IMAGES`` and of ``FILE``, in natural order within a folder or pattern.
-        address: number of a camera, or address of a stream.
+        paths: the files of ``IMAGES`` and of ``FILE``; within a folder or pattern in the order of their names'
+            numbers, see ``frame_names``.
+        address: number, path or name of a camera, or address of a stream.
+        left_out: number of files of a folder or pattern that are hidden, empty or cut off.
     """
 
     kind: SourceKind
     name: str
     paths: tuple[Path, ...] = ()
     address: str = ""
+    left_out: int = 0
 
 
 def name_sources(texts: Iterable[str]) -> list[NamedSource]:
@@ -64,7 +70,8 @@ def name_sources(texts: Iterable[str]) -> list[NamedSource]:
         for source in _named_by(text):
             if source.kind is SourceKind.IMAGES and found and found[-1].kind is SourceKind.IMAGES:
                 name = f"{found[-1].name}, {source.name}" if source.name != found[-1].name else source.name
-                source = NamedSource(SourceKind.IMAGES, name, found[-1].paths + source.paths)
+                paths, left_out = found[-1].paths + source.paths, found[-1].left_out + source.left_out
+                source = NamedSource(SourceKind.IMAGES, name, paths, left_out=left_out)
                 found.pop()
             found.append(source)
     return found
@@ -95,24 +102,60 @@ def is_stream_address(text: str) -> bool:
     return _ADDRESS.match(text) is not None
 
 
-def find_images(folder: Path) -> list[Path]:
-    """The image files of a folder: frame2 before frame10.
+def find_images(folder: Path) -> NamedSource:
+    """The image files of a folder, without hidden, empty and half-copied files.
 
     Raises:
         SourceError: the folder cannot be read, or holds no image.
     """
     try:
-        paths = sorted(
-            (path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES),
-            key=_natural_sort_key,
-        )
+        found = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES]
     except OSError as error:
         raise SourceError(f"{folder}: cannot be read ({error.strerror or error})") from None
-    if not paths:
+    source = _in_order(found, str(folder))
+    if not source.paths:
+        others = f" ({source.left_out} hidden, empty or cut off)" if source.left_out else ""
         raise SourceError(
-            f"{folder}: holds no image; expected files ending in {', '.join(sorted(IMAGE_SUFFIXES))}"
+            f"{folder}: holds no image{others}; expected files ending in {', '.join(sorted(IMAGE_SUFFIXES))}"
         )
-    return paths
+    return source
+
+
+def is_whole(path: Path) -> bool:
+    """False for an image file that is empty or cut off: a PNG or JPEG without its end."""
+    if not is_regular_file(path):
+        return True  # its reader says what it is
+    try:
+        with open_file(path) as file:
+            head = file.read(8)
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(0, size - _TAIL_BYTES))
+            tail = file.read(_TAIL_BYTES)
+            if head.startswith(b"\x89PNG"):
+                return b"IEND" in tail
+            if head.startswith(b"\xff\xd8") and b"\xff\xd9" not in tail:
+                file.seek(0)
+                return has_jpeg_end(file.read())
+    except (InputError, OSError):
+        return True
+    return size > 0
+
+
+def has_jpeg_end(data: bytes) -> bool:
+    """True if a JPEG has its end after the beginning of its pixels, whatever follows it."""
+    at = 2
+    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != 0xDA:  # until the start of scan
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return data.find(b"\xff\xd9", at) >= 0
+
+
+def _in_order(found: Iterable[Path], name: str) -> NamedSource:
+    """The pictures of one folder or pattern."""
+    files = sorted(found, key=_natural_sort_key)
+    whole = [path for path in files if not path.name.startswith(".") and is_whole(path)]
+    return NamedSource(
+        SourceKind.IMAGES, name, tuple(in_order_of_names(whole)), left_out=len(files) - len(whole)
+    )
 
 
 def _named_by(text: str) -> Sequence[NamedSource]:
@@ -130,7 +173,7 @@ def _named_by(text: str) -> Sequence[NamedSource]:
 def _named_path(path: Path, name: str) -> NamedSource:
     """The source of a file. The file is not opened here; a missing file is found when the file is read."""
     if is_folder(path):
-        return NamedSource(SourceKind.IMAGES, name, tuple(find_images(path)))
+        return replace(find_images(path), name=name)
     kind = SourceKind.IMAGES if path.suffix.lower() in IMAGE_SUFFIXES else SourceKind.FILE
     return NamedSource(kind, name, (path,))
 
@@ -147,6 +190,10 @@ def _matching(pattern: str) -> list[NamedSource]:
     files = [path for path in found if not is_folder(path)]
     if not found:
         raise SourceError(f"{pattern}: no file matches this pattern")
+    pictures = [path for path in files if path.suffix.lower() in IMAGE_SUFFIXES]
+    if pictures and len(pictures) == len(files):
+        source = _in_order(pictures, pattern)
+        return [source] if source.paths else [replace(source, paths=tuple(pictures), left_out=0)]
     return [_named_path(path, pattern) for path in (files or found)]
 
 

@@ -31,8 +31,8 @@ def build_layout(design: Design) -> Layout:
         DesignError: the sizes cannot be resolved, there are too many virtual markers, or the clip outline removes the
             reference cell or one of its neighbours.
 
-    >>> from cmpdesign import load_design
-    >>> layout = build_layout(load_design("honeycomb", {"layers": "10", "pitch_mm": "1.5"}))
+    >>> from cmpdesign import load
+    >>> layout = build_layout(load("honeycomb", {"layers": "10", "pitch_mm": "1.5"}))
     >>> len(layout.marker_xy_mm), len(layout.cell_corners), len(layout.edges)
     (331, 600, 930)
     >>> layout.size_mm

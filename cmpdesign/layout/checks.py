@@ -77,8 +77,8 @@ def check_design(
     Raises:
         DesignError: the design has no layout.
 
-    >>> from cmpdesign import load_design
-    >>> [str(finding) for finding in check_design(load_design("honeycomb", {"pitch_mm": "0.3mm"}))]
+    >>> from cmpdesign import load
+    >>> [str(finding) for finding in check_design(load("honeycomb", {"pitch_mm": "0.3mm"}))]
     ['smallest cell (inscribed circle): 0.173 mm, limit 0.3 mm; make pitch_mm larger']
     """
     layout = layout or build_layout(design)

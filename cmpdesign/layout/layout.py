@@ -31,6 +31,8 @@ class AsMade:
             markers.
         covariance_mm2: (M, 2, 2) float64, of the places of the layout's markers, NaN for a marker that was not
             measured and stays at its nominal place; None: unknown.
+        cell_height_mm: height of the cells over the black, which holds the markers, towards the camera; negative:
+            recessed cells; 0: flat.
     """
 
     of: str
@@ -38,6 +40,7 @@ class AsMade:
     side: Literal["front", "back"]
     outlines_mm: NDArray[np.float64] | None = None
     covariance_mm2: NDArray[np.float64] | None = None
+    cell_height_mm: float = 0.0
 
     def __post_init__(self) -> None:
         for column in (self.outlines_mm, self.covariance_mm2):
@@ -140,6 +143,11 @@ class Layout:
             return self.as_made.outlines_mm
         outlines: NDArray[np.float64] = self.marker_xy_mm[self.cell_corners[self.colored_cells]]
         return outlines
+
+    @property
+    def cell_height_mm(self) -> float:
+        """Height of the cells over the black, towards the camera; negative: recessed; 0 for a flat pad."""
+        return 0.0 if self.as_made is None else self.as_made.cell_height_mm
 
     @cached_property
     def virtual_xy_mm(self) -> NDArray[np.float64]:

@@ -59,8 +59,8 @@ class DesignReport:
 def design_report(design: Design, layout: Layout, camera_px: tuple[int, int] = CAMERA_PX) -> DesignReport:
     """The key figures of a design and its layout; ``camera_px`` as in ``check_design``.
 
-    >>> from cmpdesign import build_layout, load_design
-    >>> design = load_design("tac3d")
+    >>> from cmpdesign import build_layout, load
+    >>> design = load("tac3d")
     >>> design_report(design, build_layout(design)).points
     4981
     """

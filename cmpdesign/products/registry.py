@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 
 if TYPE_CHECKING:
     import numpy as np
@@ -74,7 +74,7 @@ class Product:
     Attributes:
         maker: "module:function" of the ``Maker``.
         where: the file or folder that the product writes; a folder ends with "/".
-        usual: True if a plain ``build`` makes the product; other products are made when ``--only`` names them.
+        usual: True if a plain ``build`` makes the product; other products are made when they are named.
         pad: "module:function" that makes the product's pad of ``(design, layout)``; empty if it makes no other pad
             than the products before it.
     """
@@ -120,9 +120,9 @@ def chosen_products(only: str) -> list[str]:
     names = [name.strip() for name in only.split(",") if name.strip()]
     for name in names:
         if name not in PRODUCTS:
-            raise CmpDesignError(f"--only {name}: unknown; there are {', '.join(PRODUCTS)}")
+            raise CmpDesignError(f"{parameter('products')} {name}: unknown; there are {', '.join(PRODUCTS)}")
     if not names:
-        raise CmpDesignError(f"--only names no file; there are {', '.join(PRODUCTS)}")
+        raise CmpDesignError(f"{parameter('products')} names no file; there are {', '.join(PRODUCTS)}")
     return [name for name in PRODUCTS if name in names]
 
 

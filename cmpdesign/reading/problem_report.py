@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from cmpdesign import __version__
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import Image, to_png
 from cmpdesign.libraries import OPENCV_DISTRIBUTIONS
@@ -60,7 +60,7 @@ class ProblemReport:
         if len(self._pictures) == MOST_PICTURES:
             raise CmpDesignError(
                 f"a report of a problem holds at most {MOST_PICTURES} pictures; give those that show the problem, "
-                "or fewer --frames"
+                f"or fewer {parameter('frames')}"
             )
         file = f"pictures/{name}"
         self._files[file] = content

@@ -52,4 +52,4 @@ def _as_made(reference: Reference) -> AsMade | None:
         return None
     outlines = None if made.outlines_mm is None else equal_length_outlines(made.outlines_mm)
     side = seen_side(made.side == "back")
-    return AsMade(made.of, made.product, side, outlines, made.covariance_mm2)
+    return AsMade(made.of, made.product, side, outlines, made.covariance_mm2, made.cell_height_mm)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.patterns.colors import BLACK, BLUE, COLORS, GREEN, RED, WHITE
 from cmpdesign.reading.other_pattern import other_pattern_reason
 from cmpdesign.reading.quality import quality_to_json
@@ -31,7 +31,7 @@ _MIN_CHROMA_SHARE = 0.4
 _SIDE_CAUSES = {
     "other_side": "a mirrored camera, the pad's other face, or an RGB image saved as BGR",
     "mirrored": "a mirrored camera or the pad's other face, by the hues of the inks",
-    "swapped_channels": "red and blue are swapped, by the hues of the inks: an RGB image saved as BGR (--channels rgb)",
+    "swapped_channels": "red and blue are swapped, by the hues of the inks: an RGB image saved as BGR",
 }
 
 
@@ -164,7 +164,11 @@ def _wrong_side_reason(reference: Reference, image: Image, markers: Markers) -> 
         if own.any():
             inks[row] = np.median(level[own], axis=0)
     why = reason_by_hues(inks, nominal_hues_deg(dict(reference.palette)))
-    return f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}: {_SIDE_CAUSES[why]}"
+    remedy = f" ({parameter('channels', 'rgb')})" if why == "swapped_channels" else ""
+    return (
+        f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}: "
+        f"{_SIDE_CAUSES[why]}{remedy}"
+    )
 
 
 def _too_few_reason(markers: Markers, measured: int, present: int, min_share: float) -> str | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.inputs.texts import visible
+from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 Columns = dict[str, NDArray[Any]]
 
@@ -47,6 +48,21 @@ def head_columns(frames: Sequence[Any]) -> Columns:
         "frame_status": np.array([frame.status for frame in frames], np.uint8),
         "reason": np.array([visible(frame.reason) for frame in frames], REASON),
         "elapsed_ms": np.array([frame.elapsed_ms for frame in frames], np.float32),
+    }
+
+
+def unknown_times() -> SourceTimes:
+    """Times of frames that come from no source."""
+    return SourceTimes("none", "")
+
+
+def time_columns(times: SourceTimes) -> Columns:
+    """The shared columns of times: when ``time_s`` was 0, s since 1970 (NaN where unknown), and what says so."""
+    began_s = np.nan if times.began_unix_s is None else times.began_unix_s
+    return {
+        "times_of": np.array(times.of),
+        "began_unix_s": np.array(began_s, np.float64),
+        "began_of": np.array(times.began_of or ""),
     }
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cmpdesign.contact.elastomer import Elastomer
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.files import read_text
 from cmpdesign.units import parse_length_mm
@@ -41,7 +41,7 @@ def read_elastomer(path: Path) -> Elastomer:
     if table is None or "thickness_mm" not in table:
         raise CmpDesignError(
             f"{path} has no [elastomer] with thickness_mm, which is needed to compute the touched surface; "
-            "add thickness_mm, marker_depth_mm and poisson, or leave out --surface"
+            f"add thickness_mm, marker_depth_mm and poisson, or leave out {parameter('surface')}"
         )
     lengths = {
         name: _length_mm(path, name, table.get(name, 0.0)) for name in ("thickness_mm", "marker_depth_mm")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.video_writer import CODECS, VideoWriter
 
 if TYPE_CHECKING:
@@ -39,7 +39,9 @@ class OverlayWriter:
 
     def __init__(self, path: Path, reference: Reference, fps: float) -> None:
         if path.suffix not in CODECS:
-            raise CmpDesignError(f"--overlay {path}: unknown ending; expected one of {', '.join(CODECS)}")
+            raise CmpDesignError(
+                f"{parameter('overlay')} {path}: unknown ending; expected one of {', '.join(CODECS)}"
+            )
         self._video = VideoWriter(path, fps)
         self._reference = reference
         self._size: tuple[int, int] | None = None

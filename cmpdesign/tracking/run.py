@@ -6,7 +6,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,8 +85,16 @@ class TrackingRun:
 
     def _track(self, watch: Callable[[Any], None]) -> None:
         self._wait_for_viewer()
+        last_s = float("-inf")
         for frame in self.source.frames():
             tracked = self.tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
+            notes = [tracked.reason]
+            if frame.problem not in tracked.reason:  # of one of several views
+                notes.append(frame.problem)
+            if frame.time_s <= last_s:
+                notes.append("its time is not after that of the frame before")
+            tracked = replace(tracked, reason="; ".join(filter(None, notes)))
+            last_s = max(last_s, frame.time_s) if frame.time_s == frame.time_s else last_s
             self.sink.add(tracked, frame.image)
             if self.live is not None:
                 self.live.add(tracked, frame.image)

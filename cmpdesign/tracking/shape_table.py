@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmpdesign.tracking.columns import Columns, head_columns, long_head_columns
+from cmpdesign.tracking.columns import Columns, head_columns, long_head_columns, time_columns, unknown_times
+from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
@@ -31,6 +32,7 @@ class ShapeTable:
         reconstructor: its layout, poses and rest frame are the shared columns.
         continuation: continues the markers' displacements to the touched surface, for further columns; None: not
             wanted.
+        times: gives how the frames' times were found, for the shared columns.
     """
 
     _digits: Mapping[str, int] = (
@@ -44,8 +46,13 @@ class ShapeTable:
         f"surface_cov_{name}_mm2": 12 for name in COVARIANCE
     }
 
-    def __init__(self, reconstructor: Reconstructor, continuation: SurfaceContinuation | None = None) -> None:
-        self._reconstructor, self._continuation = reconstructor, continuation
+    def __init__(
+        self,
+        reconstructor: Reconstructor,
+        continuation: SurfaceContinuation | None = None,
+        times: Callable[[], SourceTimes] = unknown_times,
+    ) -> None:
+        self._reconstructor, self._continuation, self._times = reconstructor, continuation, times
         self.digits: Mapping[str, int] = (
             dict(self._digits) if continuation is None else {**self._digits, **self._surface_digits}
         )
@@ -89,6 +96,7 @@ class ShapeTable:
             "pose_rms_px": poses.rms_px,
             "pose_misfit": np.array(poses.misfit),
             "model_px": np.array(reconstructor.model_px),
+            **time_columns(self._times()),
         }
 
 

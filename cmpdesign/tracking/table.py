@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmpdesign.tracking.columns import HEAD, Columns, head_columns, long_head_columns
+from cmpdesign.tracking.columns import (
+    HEAD,
+    Columns,
+    head_columns,
+    long_head_columns,
+    time_columns,
+    unknown_times,
+)
+from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 if TYPE_CHECKING:
     from extractor.track.tracker import Tracked, Tracker
@@ -18,6 +26,7 @@ class TrackTable:
 
     Args:
         tracker: its layout and rest frame are the shared columns.
+        times: gives how the frames' times were found, for the shared columns.
     """
 
     digits: Mapping[str, int] = {name: 0 for name in ("marker", "layer", "index", "status")} | {
@@ -25,14 +34,14 @@ class TrackTable:
         "dx_px": 5, "dy_px": 5, "dx_mm": 6, "dy_mm": 6,
     }  # fmt: skip
 
-    def __init__(self, tracker: Tracker) -> None:
-        self._tracker = tracker
+    def __init__(self, tracker: Tracker, times: Callable[[], SourceTimes] = unknown_times) -> None:
+        self._tracker, self._times = tracker, times
 
     def batch(self, frames: Sequence[Tracked]) -> Columns:
         return frame_columns(frames)
 
     def about(self) -> Columns:
-        return fixed_columns(self._tracker)
+        return fixed_columns(self._tracker) | time_columns(self._times())
 
 
 def table_long_form(columns: Columns, fixed: Columns) -> Columns:

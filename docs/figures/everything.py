@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks.camera.page import page_pictures
+from benchmarks.camera.page import page_pictures as camera_pictures
+from benchmarks.photoreal.page import page_pictures as photoreal_pictures
 
 from . import api, commands, fields, gallery, measured, presets, reasons
 from .pictures import contact, drawings, failures, hero, lengths, scene_templates, sides, stages, surface
@@ -33,7 +34,7 @@ def pictures() -> dict[str, bytes]:
     found: dict[str, bytes] = {}
     for part in PARTS:
         found |= part.figures()
-    return found | page_pictures()
+    return found | camera_pictures() | photoreal_pictures()
 
 
 def pages() -> dict[Path, str]:

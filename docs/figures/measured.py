@@ -9,6 +9,7 @@ from benchmarks.ablation import report as ablation
 from benchmarks.acceptance import report as acceptance
 from benchmarks.camera import page as camera
 from benchmarks.datasets import run as datasets
+from benchmarks.photoreal import page as photoreal
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.pooled import PooledResult
 from benchmarks.suites.comparison.report import comparison_markdown, comparison_picture, pooled_markdown
@@ -59,6 +60,7 @@ def pages() -> dict[Path, str]:
         "comparison": comparison_markdown(_compared()),
         "conditions": conditions,
         "figures": key_figures(_compared()),
+        "speed": preset_times(_compared()),
     }
     pooled = [PooledResult(**row) for row in read_measured("comparison").get("pooled", ())]
     if pooled:
@@ -69,16 +71,30 @@ def pages() -> dict[Path, str]:
         | extraction.markdown(read_measured("extraction"))
         | datasets.markdown(read_measured("datasets"))
         | camera.documentation_blocks(read_measured("camera"))
+        | photoreal.documentation_blocks(read_measured("photoreal"))
         | ablation.documentation_blocks(read_measured(ablation.NAME))
         | acceptance.documentation_blocks(read_measured(acceptance.NAME))
     )
+
+
+def preset_times(results: list[MethodResult]) -> str:
+    """The table of docs/how-to/speed.md: the time and the error of every preset in the standard scene."""
+    rows = ["| preset | time of 397 markers, ms | error of the exact bound |", "|---|---|---|"]
+    for preset in PRESETS:
+        flat = _flat(results, preset)
+        rows.append(f"| `{preset}` | {flat.ms:.1f} | {flat.inner_px / flat.bound_px:.2f} |")
+    return "\n".join([*rows, "", "Printed by `python -m benchmarks.comparison`."])
+
+
+def _flat(results: list[MethodResult], preset: str) -> MethodResult:
+    return next(r for r in results if (r.method, r.scene) == (f"cmpdesign, {preset}", "flat"))
 
 
 def key_figures(results: list[MethodResult]) -> str:
     """The table of README: what is measured, and the command that prints it."""
     rows = ["| measured | figure | printed by |", "|---|---|---|"]
     for preset in PRESETS:
-        flat = next(r for r in results if (r.method, r.scene) == (f"cmpdesign, {preset}", "flat"))
+        flat = _flat(results, preset)
         of_bound = flat.inner_px / flat.bound_px
         rows.append(
             f"| 397 markers at 20 px, preset `{preset}` | {flat.inner_px:.4f} px RMS per axis, {of_bound:.2f} of the "

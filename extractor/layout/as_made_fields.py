@@ -9,19 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.layout import json_fields as fields
+from extractor.layout.consistency import MAX_CELL_HEIGHT_MM
 from extractor.layout.reference import AsMade
 
 SIDES = ("front", "back")
-MIN_OUTLINE = 3
+OPTIONAL = ("outlines", "covariance_mm2", "cell_height_mm")
 COLUMNS = ("xx", "xy", "yy")  # of a covariance
 
 
-def read_as_made(document: dict[str, Any], colored: int, markers: int) -> AsMade | None:
+def read_as_made(document: dict[str, Any], markers: int) -> AsMade | None:
     """The made pad; None for a pad as designed.
 
     Args:
         document: the layout file.
-        colored, markers: numbers of cells that are not black, and of markers.
+        markers: number of markers.
 
     Raises:
         LayoutError: a field is wrong.
@@ -29,7 +30,8 @@ def read_as_made(document: dict[str, Any], colored: int, markers: int) -> AsMade
     if "as_made" not in document:
         return None
     made = fields.mapping(document["as_made"], "as_made")
-    fields.known_fields(made, ("of", "product", "side"), "as_made.", optional=("outlines", "covariance_mm2"))
+    fields.known_fields(made, ("of", "product", "side"), "as_made.", optional=OPTIONAL)
+    fields.require_version_2(made, ("cell_height_mm",), "as_made.", document["version"])
     of = fields.text_field(made["of"], "as_made.of")
     if not re.fullmatch("[0-9a-f]{64}", of):
         fields.fail("as_made.of", fields.shown(of), "the digest of a layout, 64 hex digits")
@@ -40,25 +42,23 @@ def read_as_made(document: dict[str, Any], colored: int, markers: int) -> AsMade
         of=of,
         product=fields.text_field(made["product"], "as_made.product"),
         side=side,
-        outlines_mm=_outlines_mm(made["outlines"], colored) if "outlines" in made else None,
+        outlines_mm=_outlines_mm(made["outlines"]) if "outlines" in made else None,
         covariance_mm2=_covariance_mm2(made["covariance_mm2"], markers) if "covariance_mm2" in made else None,
+        cell_height_mm=_cell_height_mm(made.get("cell_height_mm", 0.0)),
     )
 
 
-def _outlines_mm(outlines: object, colored: int) -> tuple[NDArray[np.float64], ...]:
-    if not isinstance(outlines, list) or len(outlines) != colored:
-        fields.fail(
-            "as_made.outlines",
-            fields.shown(outlines),
-            f"{colored} outlines, one for each cell that is not black",
-        )
-    rings = tuple(fields.points_mm(ring, f"as_made.outlines[{i}]") for i, ring in enumerate(outlines))
-    for number, ring in enumerate(rings):
-        if len(ring) < MIN_OUTLINE:
-            fields.fail(
-                f"as_made.outlines[{number}]", f"a list of {len(ring)}", f"at least {MIN_OUTLINE} points"
-            )
-    return rings
+def _cell_height_mm(value: object) -> float:
+    if type(value) not in (int, float) or not abs(value) <= MAX_CELL_HEIGHT_MM:  # type: ignore[arg-type]
+        limit = f"{MAX_CELL_HEIGHT_MM:g}"
+        fields.fail("as_made.cell_height_mm", fields.shown(value), f"a number from -{limit} to {limit} mm")
+    return float(value)  # type: ignore[arg-type]
+
+
+def _outlines_mm(outlines: object) -> tuple[NDArray[np.float64], ...]:
+    if not isinstance(outlines, list):
+        fields.fail("as_made.outlines", fields.shown(outlines), "a list of outlines")
+    return tuple(fields.points_mm(ring, f"as_made.outlines[{i}]") for i, ring in enumerate(outlines))
 
 
 def _covariance_mm2(value: object, markers: int) -> NDArray[np.float64]:

@@ -1,29 +1,145 @@
-"""Checks of a layout's fields against each other: numbering, cells, colors, edges, reference cell."""
+"""Checks of a layout: its arrays alone, then its fields against each other.
+
+Native loops follow the indices of a layout without checks of their own. A ``Reference`` is checked here once, when the
+value is made.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.layout.json_fields import fail
+from extractor.layout.json_fields import MAX_INT, MAX_MM, fail
 from extractor.layout.lattice import NEIGHBOUR_STEPS, axial_coordinates
 
-if TYPE_CHECKING:
-    from extractor.layout.reference import Reference
-
 BLACK, WHITE = 3, 4
+# The cross product of two sides of a cell: that of sides of a nanometre. Smaller ones have too few digits.
+MIN_TURN_MM2 = 1e-12
 # Axial corners of the cells (0, 0).
 UP_CORNERS, DOWN_CORNERS = np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0, 0], [0, 1], [-1, 1]])
+MIN_OUTLINE = 3
+MAX_CELL_HEIGHT_MM = 10.0
+COLOR_COUNT = 5
+MAX_VIRTUAL_PER_EDGE = 1000
+MAX_VIRTUAL_MARKERS = 4_000_000  # of a layout; a result holds 49 bytes for each virtual marker
 
 
-def check_consistency(reference: Reference) -> None:
-    """Check that no field contradicts another.
+Pattern = Any  # a ``Reference``, whose module imports this one
+
+
+class _Column(NamedTuple):
+    """The form of an array: its field, dtype, shapes that are allowed, and the smallest and largest value."""
+
+    field: str
+    dtype: type
+    shapes: tuple[tuple[int, ...], ...]
+    low: float
+    high: float
+
+
+def _check_arrays(reference: Pattern) -> None:
+    """Check that every array can be indexed, and that every index in an array leads to an entry.
 
     Raises:
-        LayoutError: the first contradiction.
+        LayoutError: the first array with another dtype or shape, or with a value out of range.
     """
+    markers = _length(reference.layer, "layer")
+    cells = _length(reference.cell_corners, "cell_corners")
+    for column in _columns(markers, cells):
+        _check_column(getattr(reference, column.field), column)
+    for field, high in (("reference_cell", cells - 1), ("reference_marker", markers - 1)):
+        _check_whole(getattr(reference, field), field, high)
+    edges = len(reference.edges)
+    _check_whole(reference.virtual_per_edge, "virtual_per_edge", MAX_VIRTUAL_PER_EDGE)
+    if reference.virtual_per_edge * edges > MAX_VIRTUAL_MARKERS:
+        fail(
+            "virtual_per_edge",
+            f"{reference.virtual_per_edge} on {edges} edges",
+            f"at most {MAX_VIRTUAL_MARKERS} virtual markers, {MAX_VIRTUAL_MARKERS // edges} an edge",
+        )
+    if reference.as_made is not None:
+        colored = int(np.count_nonzero(reference.cell_color != 3))
+        _check_as_made(reference.as_made, markers, colored)
+
+
+def _columns(markers: int, cells: int) -> Iterator[_Column]:
+    yield _Column("layer", np.int32, ((markers,),), 0, MAX_INT)
+    yield _Column("index", np.int32, ((markers,),), 0, MAX_INT)
+    yield _Column("xy_mm", np.float64, ((markers, 2),), -MAX_MM, MAX_MM)
+    yield _Column("cell_corners", np.int32, ((cells, 3), (cells, 4)), 0, markers - 1)
+    yield _Column("cell_color", np.uint8, ((cells,),), 0, COLOR_COUNT - 1)
+    yield _Column("edges", np.int32, ((-1, 2),), 0, markers - 1)
+    yield _Column("outline_mm", np.float64, ((-1, 2),), -MAX_MM, MAX_MM)
+    yield _Column("fiducials_mm", np.float64, ((-1, 2),), -MAX_MM, MAX_MM)
+
+
+def _check_as_made(made: Any, markers: int, colored: int) -> None:
+    if made.covariance_mm2 is not None:
+        shape = ((markers, 2, 2),)
+        _check_form(made.covariance_mm2, _Column("as_made.covariance_mm2", np.float64, shape, 0, 0))
+    if not abs(made.cell_height_mm) <= MAX_CELL_HEIGHT_MM:
+        limit = f"{MAX_CELL_HEIGHT_MM:g}"
+        fail("as_made.cell_height_mm", f"{made.cell_height_mm:g}", f"a number from -{limit} to {limit} mm")
+    if made.outlines_mm is None:
+        return
+    if len(made.outlines_mm) != colored:
+        fail(
+            "as_made.outlines",
+            f"a list of {len(made.outlines_mm)}",
+            f"{colored} outlines, one for each cell that is not black",
+        )
+    for number, outline in enumerate(made.outlines_mm):
+        field = f"as_made.outlines[{number}]"
+        _check_column(outline, _Column(field, np.float64, ((-1, 2),), -MAX_MM, MAX_MM))
+        if len(outline) < MIN_OUTLINE:
+            fail(field, f"a list of {len(outline)}", f"at least {MIN_OUTLINE} points")
+
+
+def _length(array: Any, field: str) -> int:
+    if not isinstance(array, np.ndarray) or not array.ndim or not len(array):
+        fail(field, f"a {type(array).__name__} without entries", "an array of one entry or more")
+    return len(array)
+
+
+def _check_form(array: Any, column: _Column) -> None:
+    if not isinstance(array, np.ndarray) or array.dtype != column.dtype:
+        found = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
+        fail(column.field, f"of {found}", f"an array of {np.dtype(column.dtype)}")
+    if not any(_fits(array.shape, shape) for shape in column.shapes):
+        wanted = " or ".join(str(shape).replace("-1", "N") for shape in column.shapes)
+        fail(column.field, f"of the shape {array.shape}", f"the shape {wanted}")
+    if not array.flags.c_contiguous:
+        fail(column.field, "not contiguous", "an array in C order, as of numpy.ascontiguousarray")
+
+
+def _check_column(array: Any, column: _Column) -> None:
+    _check_form(array, column)
+    wrong = ~((array >= column.low) & (array <= column.high))  # NaN compares with nothing
+    if wrong.any():
+        place = tuple(int(i) for i in np.argwhere(wrong)[0])
+        at = "".join(f"[{i}]" for i in place)
+        fail(f"{column.field}{at}", f"{array[place]:g}", f"a number from {column.low:g} to {column.high:g}")
+
+
+def _fits(found: tuple[int, ...], wanted: tuple[int, ...]) -> bool:
+    return len(found) == len(wanted) and all(w in (-1, f) for f, w in zip(found, wanted, strict=True))
+
+
+def _check_whole(value: object, field: str, high: int) -> None:
+    if type(value) is not int or not 0 <= value <= high:
+        fail(field, repr(value)[:40], f"a whole number from 0 to {high}")
+
+
+def check_consistency(reference: Pattern) -> None:
+    """Check that every array can be indexed, that every index leads to an entry, and that no field contradicts another.
+
+    Raises:
+        LayoutError: the first array of another dtype or shape, the first value out of range, or contradiction.
+    """
+    _check_arrays(reference)
     triangular = reference.cell_corners.shape[1] == 3
     if triangular:
         _check_layers(reference)
@@ -50,7 +166,7 @@ def polygon_area(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(0.5 * doubled.sum(axis=-1), dtype=np.float64)
 
 
-def _check_layers(reference: Reference) -> None:
+def _check_layers(reference: Pattern) -> None:
     """Check the layers: layer k holds 6k markers (layer 0 one), so marker i of layer k has the id 3k(k-1) + 1 + i."""
     count = len(reference.layer)
     layers = round((np.sqrt(12 * count - 3) - 3) / 6)
@@ -62,7 +178,7 @@ def _check_layers(reference: Reference) -> None:
     _check_numbering(reference, layer, index)
 
 
-def _check_rows(reference: Reference) -> None:
+def _check_rows(reference: Pattern) -> None:
     """Check the rows of a square pattern: ids run row by row, and all rows have the same length."""
     count = len(reference.layer)
     columns = int(reference.index.max()) + 1
@@ -71,7 +187,7 @@ def _check_rows(reference: Reference) -> None:
     _check_numbering(reference, np.arange(count) // columns, np.arange(count) % columns)
 
 
-def _check_numbering(reference: Reference, layer: NDArray[np.int_], index: NDArray[np.int_]) -> None:
+def _check_numbering(reference: Pattern, layer: NDArray[np.int_], index: NDArray[np.int_]) -> None:
     for field, found, expected in (("layer", reference.layer, layer), ("index", reference.index, index)):
         wrong = np.flatnonzero(found != expected)
         if len(wrong):
@@ -83,13 +199,13 @@ def _check_numbering(reference: Reference, layer: NDArray[np.int_], index: NDArr
             )
 
 
-def _check_cells(reference: Reference) -> None:
+def _check_cells(reference: Pattern) -> None:
     """Check that cells are counter-clockwise and listed once: every corner turns left, a repeated corner does not."""
     corners = reference.cell_corners
     xy = reference.xy_mm[corners]
     incoming, outgoing = xy - np.roll(xy, 1, axis=1), np.roll(xy, -1, axis=1) - xy
     turn = incoming[..., 0] * outgoing[..., 1] - incoming[..., 1] * outgoing[..., 0]
-    wrong = np.flatnonzero((turn <= 0).any(axis=1))
+    wrong = np.flatnonzero((turn < MIN_TURN_MM2).any(axis=1))
     if len(wrong):
         first = int(wrong[0])
         fail(f"cells.corners[{first}]", str(corners[first].tolist()), "different markers, counter-clockwise")
@@ -104,7 +220,7 @@ def _check_cells(reference: Reference) -> None:
         )
 
 
-def _check_edges(reference: Reference) -> None:
+def _check_edges(reference: Pattern) -> None:
     """Check that edges go from the smaller to the larger id, ascend, and contain every side of a cell."""
     edges = reference.edges.astype(np.int64)
     count = len(reference.layer)
@@ -127,7 +243,7 @@ def _check_edges(reference: Reference) -> None:
         fail("edges", f"without {ends[first].tolist()}", f"every side of cell {first // corners.shape[1]}")
 
 
-def _check_reference_cell(reference: Reference, triangular: bool) -> None:
+def _check_reference_cell(reference: Pattern, triangular: bool) -> None:
     cell, marker = reference.reference_cell, reference.reference_marker
     if marker not in reference.cell_corners[cell]:
         fail("reference.marker", str(marker), f"a corner of the reference cell {cell}")
@@ -140,7 +256,7 @@ def _check_reference_cell(reference: Reference, triangular: bool) -> None:
         fail("reference.marker", str(marker), "0, where the numbering of layers starts")
 
 
-def _check_colors(reference: Reference) -> None:
+def _check_colors(reference: Pattern) -> None:
     """Check that a marker touches at most one red, one green and one blue cell, clockwise in this order."""
     count = len(reference.layer)
     cell_of = np.full((count, 3), -1)
@@ -158,7 +274,7 @@ def _check_colors(reference: Reference) -> None:
         fail("cells.color", f"counter-clockwise around marker {wrong[0]}", "red, green, blue clockwise")
 
 
-def _check_lattice(reference: Reference) -> None:
+def _check_lattice(reference: Pattern) -> None:
     """Check that cells and edges are those of the triangular lattice, so that no marker has more than six edges.
 
     The corners of the up-cell (q, r) add up to (3q + 1, 3r + 1), those of the down-cell (q, r) to (3q - 1, 3r + 2).
@@ -177,7 +293,7 @@ def _check_lattice(reference: Reference) -> None:
     _require_neighbours(reference, (step[:, None] == NEIGHBOUR_STEPS).all(axis=2).any(axis=1))
 
 
-def _check_grid(reference: Reference) -> None:
+def _check_grid(reference: Pattern) -> None:
     """Check that cells and edges are those of the square grid."""
     place = np.stack([reference.layer, reference.index], axis=1)
     corners = place[reference.cell_corners]
@@ -188,14 +304,14 @@ def _check_grid(reference: Reference) -> None:
     _require_neighbours(reference, np.abs(step).sum(axis=1) == 1)
 
 
-def _require_cells(reference: Reference, right: NDArray[np.bool_], expected: str) -> None:
+def _require_cells(reference: Pattern, right: NDArray[np.bool_], expected: str) -> None:
     wrong = np.flatnonzero(~right)
     if len(wrong):
         first = int(wrong[0])
         fail(f"cells.corners[{first}]", str(reference.cell_corners[first].tolist()), expected)
 
 
-def _require_neighbours(reference: Reference, neighbours: NDArray[np.bool_]) -> None:
+def _require_neighbours(reference: Pattern, neighbours: NDArray[np.bool_]) -> None:
     wrong = np.flatnonzero(~neighbours)
     if len(wrong):
         first = int(wrong[0])

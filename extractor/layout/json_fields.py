@@ -102,6 +102,17 @@ def _known(names: Sequence[str], optional: Sequence[str]) -> str:
     return f"only the fields {', '.join((*names, *optional))}"
 
 
+def require_version_2(container: dict[str, Any], names: Sequence[str], prefix: str, version: int) -> None:
+    """Check that a file of version 1 has none of these fields, which version 2 adds."""
+    for name in names:
+        if version < 2 and name in container:
+            fail(
+                prefix + name,
+                f"given in a file of version {version}",
+                "version 2, or a file without the field",
+            )
+
+
 def nearest_name(word: str, known: Sequence[str]) -> str:
     """The part of a message that states the nearest known name; empty if no known name is near."""
     found = difflib.get_close_matches(word[:60], known, n=1, cutoff=0.6)

@@ -1,4 +1,4 @@
-"""An independent reader of ``layout.json``, version 1.
+"""An independent reader of ``layout.json``, versions 1 and 2.
 
 The file is the only interface to the generator. Every field is checked, then the fields against each other, then the
 digest of the geometry. ``layout.schema.json`` describes the format.
@@ -19,19 +19,18 @@ from numpy.typing import NDArray
 from extractor.errors import LayoutError
 from extractor.layout import json_fields as fields
 from extractor.layout.as_made_fields import read_as_made
-from extractor.layout.consistency import check_consistency
-from extractor.layout.reference import BLACK, COLORS, Reference
+from extractor.layout.consistency import MAX_VIRTUAL_PER_EDGE
+from extractor.layout.reference import COLORS, Reference
 from extractor.layout.text_file import printable_path, read_text_file
 
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
 MAX_BYTES = 1 << 26  # of a layout file; 200 layers take 23 MiB
-MAX_VIRTUAL_PER_EDGE = 1000
-MAX_VIRTUAL_MARKERS = 4_000_000  # of a layout; a result holds 49 bytes for each virtual marker
 FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
 OPTIONAL_FIELDS = ("fiducials", "as_made")
+VERSIONS = (1, 2)
 
 
 class HasReference(Protocol):
@@ -113,7 +112,6 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
     origin = fields.mapping(document["reference"], "reference")
     fields.known_fields(origin, ("cell", "marker"), "reference.")
     fiducials_mm, fiducial_diameter_mm = _fiducials(document)
-    color = fields.choices(cells["color"], "cells.color", len(corners), COLORS)
     reference = Reference(
         pattern=fields.text_field(document["pattern"], "pattern"),
         parameters=_parameters(document["parameters"]),
@@ -121,9 +119,11 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         index=fields.integers(markers["index"], "markers.index", fields.MAX_INT, count),
         xy_mm=np.column_stack([x_mm, y_mm]),
         cell_corners=corners,
-        cell_color=color,
+        cell_color=fields.choices(cells["color"], "cells.color", len(corners), COLORS),
         edges=fields.integer_rows(document["edges"], "edges", count - 1, (2,)),
-        virtual_per_edge=_virtual_per_edge(document),
+        virtual_per_edge=fields.integer(
+            document["virtual_per_edge"], "virtual_per_edge", 0, MAX_VIRTUAL_PER_EDGE
+        ),
         reference_cell=fields.integer(origin["cell"], "reference.cell", 0, len(corners) - 1),
         reference_marker=fields.integer(origin["marker"], "reference.marker", 0, count - 1),
         palette=_palette(document["palette"]),
@@ -132,20 +132,19 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         digest=fields.text_field(document["digest"], "digest"),
         fiducials_mm=fiducials_mm,
         fiducial_diameter_mm=fiducial_diameter_mm,
-        as_made=read_as_made(document, int(np.count_nonzero(color != BLACK)), count),
+        as_made=read_as_made(document, count),
     )
-    check_consistency(reference)
     _check_digest(reference)
     return reference
 
 
 def _check_header(document: dict[str, Any]) -> None:
     """Check format and version before all other fields, which another version may define differently."""
-    for field, expected in (("format", "cmp-layout"), ("version", 1), ("units", "mm")):
+    for field, expected in (("format", ("cmp-layout",)), ("version", VERSIONS), ("units", ("mm",))):
         value = document.get(field)
-        if type(value) is not type(expected) or value != expected:
+        if type(value) is not type(expected[0]) or value not in expected:
             found = fields.shown(value) if field in document else "missing"
-            fields.fail(field, found, fields.shown(expected))
+            fields.fail(field, found, " or ".join(map(fields.shown, expected)))
     fields.known_fields(document, FIELDS, optional=OPTIONAL_FIELDS)
     fields.text_field(document["generator"], "generator")
 
@@ -156,18 +155,6 @@ def _parameters(value: object) -> dict[str, Any]:
         fields.fail("parameters.mirrored", fields.shown(parameters["mirrored"]), "true or false")
     fields.require_plain_values(parameters, "parameters")
     return parameters
-
-
-def _virtual_per_edge(document: dict[str, Any]) -> int:
-    count = fields.integer(document["virtual_per_edge"], "virtual_per_edge", 0, MAX_VIRTUAL_PER_EDGE)
-    edges = len(document["edges"])
-    if count * edges > MAX_VIRTUAL_MARKERS:
-        fields.fail(
-            "virtual_per_edge",
-            f"{count} on {edges} edges",
-            f"at most {MAX_VIRTUAL_MARKERS} virtual markers, {MAX_VIRTUAL_MARKERS // edges} an edge",
-        )
-    return count
 
 
 def _palette(value: object) -> dict[str, str]:

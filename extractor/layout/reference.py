@@ -1,4 +1,4 @@
-"""The reader's value of a layout: a pattern as ``layout.json``, version 1, describes it."""
+"""The reader's value of a layout: a pattern as ``layout.json`` describes it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.frozen_record import FrozenRecord
+from extractor.layout.consistency import check_consistency
 
 COLORS = ("red", "green", "blue", "black", "white")
 RED, GREEN, BLUE, BLACK, WHITE = range(5)
@@ -32,6 +33,8 @@ class AsMade(FrozenRecord):
         outlines_mm: one (K, 2) float64 outline for each cell that is not black; None: triangles between the markers.
         covariance_mm2: (M, 2, 2) float64, of the places of the layout's markers, NaN for a marker that was not
             measured and stays at its nominal place; None: unknown.
+        cell_height_mm: height of the cells over the black, which holds the markers, towards the camera; negative:
+            recessed cells; 0: flat.
     """
 
     of: str
@@ -39,6 +42,7 @@ class AsMade(FrozenRecord):
     side: str
     outlines_mm: tuple[NDArray[np.float64], ...] | None = None
     covariance_mm2: NDArray[np.float64] | None = None
+    cell_height_mm: float = 0.0
 
     def __post_init__(self) -> None:
         if self.covariance_mm2 is not None:
@@ -49,7 +53,8 @@ class AsMade(FrozenRecord):
 class Reference(FrozenRecord):
     """A pattern as the layout file describes it, in read-only arrays and mappings.
 
-    Layout frame: mm, origin at marker 0, x right, y up, seen from the front.
+    Layout frame: mm, origin at marker 0, x right, y up, seen from the front. A ``Reference`` is checked when the value
+    is made, also by ``dataclasses.replace``: all code that takes one, native code included, relies on this check.
 
     Attributes:
         pattern: the pattern's name.
@@ -69,6 +74,9 @@ class Reference(FrozenRecord):
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty without marks.
         fiducial_diameter_mm: diameter of these marks.
         as_made: differences of a made pad from its design; None for a pad as designed.
+
+    Raises:
+        LayoutError: an array of another dtype or shape, an index out of range, or fields that contradict each other.
     """
 
     pattern: str
@@ -95,6 +103,7 @@ class Reference(FrozenRecord):
         return f"<Reference {self.pattern}: {self.layers} layers, {len(self.layer)} markers{made}>"
 
     def __post_init__(self) -> None:
+        check_consistency(self)
         for name in ARRAY_FIELDS:
             getattr(self, name).setflags(write=False)
         self._freeze_mappings("parameters", "palette")

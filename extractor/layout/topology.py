@@ -53,6 +53,7 @@ class Topology(NamedTuple):
         end_couplings: (E, 6) float64, see ``gridline_slopes``.
         covariance_couplings: (E, 6) float64, the same of the covariances.
         scatter_bending: (E, 3) float64, see ``gridline_slopes``.
+        cell_height: of the drawn cells over the black, towards the camera, in units of the mean edge; 0 for flat pads.
     """
 
     edges: NDArray[np.int32]
@@ -72,6 +73,7 @@ class Topology(NamedTuple):
     end_couplings: NDArray[np.float64]
     covariance_couplings: NDArray[np.float64]
     scatter_bending: NDArray[np.float64]
+    cell_height: float = 0.0
 
 
 def topology_of(layout: Reference) -> Topology:
@@ -121,6 +123,7 @@ def topology_of(layout: Reference) -> Topology:
         end_couplings=couplings,
         covariance_couplings=covariance_couplings(couplings, slopes, gridlines),
         scatter_bending=scatter_bending(slopes, edges, edge_vectors, spokes),
+        cell_height=0.0 if layout.as_made is None else layout.as_made.cell_height_mm / float(length.mean()),
     )
 
 

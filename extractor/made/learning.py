@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import ImageError, RestError
-from extractor.layout.consistency import check_consistency
 from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import AsMade, Reference
 from extractor.made.adjustment import Adjustment, Readings, adjust_places
@@ -173,7 +172,6 @@ def _as_made(layout: Reference, found: Adjustment, side: str) -> Reference:
     xy_mm = np.where(np.isfinite(found.xy_mm), np.round(found.xy_mm, DECIMALS), layout.xy_mm) + 0.0
     made = AsMade(layout.digest, PRODUCT, side, covariance_mm2=_rounded(found.cov_mm2))
     reference = replace(layout, xy_mm=xy_mm, as_made=made)
-    check_consistency(reference)
     return replace(reference, digest=reference.geometry_digest())
 
 

@@ -43,6 +43,7 @@ from extractor.refine.refinement_step import (
     gridlines_of,
     with_pattern_moved,
 )
+from extractor.refine.relief import find_parallax, without_parallax
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
 from extractor.refine.synthesis_steps import SynthesisSolver
@@ -53,6 +54,7 @@ SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at
 MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
+RELIEF_POINTS = 3  # on each gridline, by which the parallax of cells is found; chosen
 
 
 class FullScaleLimits(NamedTuple):
@@ -214,6 +216,11 @@ class Refiner:
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
         xy, cov = native.at_full_scale(xy, cov, places, scale, FULL_SCALE_LIMITS)
+        if self._topology.cell_height != 0.0:
+            beside = measure_virtual_markers(view, picture, reading, RELIEF_POINTS)[..., :2]
+            size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
+            parallax = find_parallax(self._topology, xy, beside, size_px)
+            xy, cov, points = without_parallax(parallax, xy, cov, points)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look)
         blur, noise = scale * estimate.sigma, scale * estimate.noise

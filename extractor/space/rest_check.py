@@ -33,7 +33,7 @@ ANYWHERE_MM2 = np.eye(3)  # covariance of markers that have moved
 NO_MEDIUM = "the camera looks through a gel or a window, and the rig has no [medium]"
 OTHER_MEDIUM = "the gel or the window is not as in [medium] (thickness, index or tilt)"
 OTHER_LENS = "the lens is not as in the rig (focal_px, centre_px, distortion)"
-OTHER_POSES = "the rig's poses are not those of this frame; place the views by the rest frame (--from-rest)"
+OTHER_POSES = "the rig's poses are not those of this frame; place the views by the rest frame (from_rest)"
 MOVED = "the pattern was touched or not flat; take a frame without contact, or state a dome's height (flatness_mm)"
 UNKNOWN = "none that is known; check the layout, the rig and the rest frame"
 

@@ -93,7 +93,7 @@ def test_a_rule_that_does_nothing_makes_no_difference_and_one_that_breaks_readin
     tmp_path: Path,
 ) -> None:
     pictures = list(keep_pictures("plain", 2, 1, tmp_path))
-    nothing, reading = try_rules([NOTHING, READING], pictures, "fast", 1)
+    nothing, reading = try_rules([NOTHING, READING], pictures, "balanced", 1)
     assert nothing.touched == 0 and nothing.verdict == "goes"
     assert [change.difference for change in nothing.judged] == [0, 0, 0, 0]
     visible = sum(int(picture.truths[0].visible.sum()) for picture in pictures)
@@ -106,7 +106,7 @@ def test_a_reader_that_does_not_start_is_an_error_and_no_score(tmp_path: Path, c
     pictures = list(keep_pictures("plain", 1, 1, tmp_path))
     broken = NOTHING._replace(without="import annotations, nothing\n")
     with pytest.raises(RuntimeError, match="without nothing"):
-        read_without((broken,), pictures, "fast", copy)
+        read_without((broken,), pictures, "balanced", copy)
 
 
 @pytest.mark.slow
@@ -120,7 +120,7 @@ def test_rules_in_cpp_compile_and_are_switched_off_and_on_again(copy: CodeCopy, 
                 pass
     visible = sum(int(picture.truths[0].visible.sum()) for picture in pictures)
     lost = [
-        sum(score.lost for score in read_without(rules, pictures, "fast", copy))
+        sum(score.lost for score in read_without(rules, pictures, "balanced", copy))
         for rules in ((), (NATIVE_READING,), (NOTHING,))
     ]
     assert lost[0] < 0.01 * visible and lost[1] == visible and lost[2] == lost[0]

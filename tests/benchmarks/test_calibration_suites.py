@@ -78,8 +78,8 @@ def test_squares_are_of_each_status_and_of_the_pattern_that_was_read() -> None:
 
 
 def test_parts_of_a_suite_are_the_suite() -> None:
-    jobs = [SuiteJob("scatter", ("fast",), True, 0, part, 2) for part in range(2)]
-    apart, whole = read_jobs(jobs, 1), read_pictures(SuiteJob("scatter", ("fast",), True))
+    jobs = [SuiteJob("scatter", ("balanced",), True, 0, part, 2) for part in range(2)]
+    apart, whole = read_jobs(jobs, 1), read_pictures(SuiteJob("scatter", ("balanced",), True))
     assert [reading.number for reading in apart] == [reading.number for reading in whole] == list(range(9))
     assert calibration_rows(apart) == calibration_rows(whole)
     rows = calibration_rows(whole)

@@ -231,11 +231,11 @@ def test_wrong_ids_wrong_positions_and_exceptions_are_counted_apart(tmp_path: Pa
     measured = {
         "seed": SEED,
         "pictures": 2,
-        "preset": "fast",
+        "preset": "balanced",
         "shown": [{**shown_record(result), "outcomes": "m" * len(sample_picture_markers(case))}],
         "table": rows_table([row]),
     }
-    assert f"--seed {SEED} --pictures 2 --preset fast --page" in documentation_blocks(measured)["camera"]
+    assert f"--seed {SEED} --pictures 2 --preset balanced --page" in documentation_blocks(measured)["camera"]
     sheet = cv2.imdecode(np.frombuffer(failures_picture(measured), np.uint8), cv2.IMREAD_COLOR)
     assert sheet.shape[2] == 3 and sheet.std() > 20
 

@@ -82,7 +82,7 @@ for _ in range(int(sys.argv[2])):
         image = image.astype(np.uint16) * 257
     if rng.random() < 0.2:
         image = cv2.resize(image, (int(rng.integers(16, 400)), int(rng.integers(16, 24))))
-    preset = str(rng.choice(["fast", "balanced", "accurate"]))
+    preset = str(rng.choice(["balanced", "accurate"]))
     markers = Extractor(parse_layout(small_text(pattern, layers)), preset, side="either").extract(image)
     assert np.isfinite(markers.xy_px).all(axis=1).sum() == (markers.status > 0).sum()
     assert (markers.status > 0).any() or markers.reason is not None

@@ -37,7 +37,7 @@ from extractor import Extractor, Markers, Reason, Status, parse_layout
 
 ROOT = Path(__file__).parents[2]
 NAMED_TEST = re.compile(r"`([\w/]+)::(test_\w+)`")  # folder/file::function, below tests/
-PRESETS = ("fast", "balanced", "accurate")
+PRESETS = ("balanced", "accurate")
 LAYERS = 5
 SIZE = (300, 260)
 WRONG = 0.3  # of the shortest edge

@@ -337,3 +337,9 @@ def test_exposure_haze_and_white_balance(change: Callable[[Any], Any]) -> None:
     markers = extractor().extract(image)
     assert (markers.status == Status.MEASURED).all()
     assert errors_px(markers, seen.truth).max() < 0.3
+
+
+def test_an_unknown_preset_names_the_others() -> None:
+    """There was a preset "fast"."""
+    with pytest.raises(ValueError, match="preset is 'fast'; give one of balanced, accurate"):
+        Extractor(parse_layout(small_text("honeycomb", 3)), preset="fast")  # type: ignore[arg-type]

@@ -133,7 +133,7 @@ def test_a_layout_keeps_every_byte_and_stays_read_only(duplicate: Copy) -> None:
     assert not found.present.flags.writeable
 
 
-@pytest.mark.parametrize("preset", ["fast", "balanced", "accurate"])
+@pytest.mark.parametrize("preset", ["balanced", "accurate"])
 @copies
 def test_a_copy_of_an_extractor_reads_the_same_bytes(duplicate: Copy, preset: str) -> None:
     extractor = Extractor(reference(), preset)

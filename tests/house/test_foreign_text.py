@@ -34,8 +34,8 @@ READS = {
     "cmpdesign/files/npz.py": {"np.load"},  # of a file that inputs/files.py opened
     "cmpdesign/files/locks.py": {"os.open"},  # to lock: nothing is read
     "cmpdesign/files/atomic.py": {"os.open", "open 'rb+'"},  # to flush to disk what it wrote
-    "cmpdesign/tracking/sources.py": {"cv2.VideoCapture"},
-    "cmpdesign/data/videos/pieces.py": {"open 'r'"},  # of a video, by PyAV
+    "cmpdesign/tracking/sources/live.py": {"cv2.VideoCapture"},  # of a camera
+    "cmpdesign/inputs/videos.py": {"open 'r'"},  # of a video or a stream, by PyAV
     "cmpdesign/files/video_writer.py": {"cv2.VideoCapture"},  # of the video that it wrote
     "cmpdesign/tracking/sinks/csv_recovery.py": {"open 'r+b'"},  # to cut the text behind its last whole frame
     "cmpdesign/evaluate/journal.py": {

@@ -97,7 +97,7 @@ def extractor_method(preset: Preset, points: bool = True) -> Method:
 
 def read_numbered_corners(case: SceneCase, image: Image) -> Reading:
     """Stages 1 to 7: corners fitted to the edges of each triangle separately, and merged."""
-    reader = method_extractor(case, "fast")
+    reader = method_extractor(case, "balanced")
     started = time.process_time()
     markers = reader.extract(image)
     ms, stages_ms = _elapsed_ms(started), markers.timings_ms
@@ -187,8 +187,6 @@ def _elapsed_ms(started: float) -> float:
 
 
 METHODS = (
-    extractor_method("fast", points=False),
-    extractor_method("fast"),
     extractor_method("balanced", points=False),
     extractor_method("balanced"),
     extractor_method("accurate"),

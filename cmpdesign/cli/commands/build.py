@@ -37,9 +37,11 @@ def build(
         Path, typer.Option("-o", "--output", help="Folder for the files; made if missing.")
     ] = Path("out"),
     override: SetOption = None,
-    only: Annotated[
+    products: Annotated[
         str,
-        typer.Option(metavar="NAMES", help=f"Products to make, separated by commas: {', '.join(PRODUCTS)}."),
+        typer.Option(
+            "--only", metavar="NAMES", help=f"Products to make, separated by commas: {', '.join(PRODUCTS)}."
+        ),
     ] = USUAL_NAMES,
     camera: CameraOption = CAMERA_TEXT,
     preset: PresetOption = "balanced",
@@ -59,7 +61,7 @@ def build(
     from cmpdesign.products.building import build_files
     from cmpdesign.watch import watched
 
-    names, camera_px = chosen_products(only), parse_camera(camera)
+    names, camera_px = chosen_products(products), parse_camera(camera)
     parameters = load_design(design, parse_overrides(override))
     layout = build_layout(parameters)
     print_step(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 app = typer.Typer(
     cls=Group,
     epilog=examples(
-        "cmpdesign evaluate precision -o quick --trials 1 --preset fast",
+        "cmpdesign evaluate precision -o quick --trials 1",
         "cmpdesign evaluate designs tac3d digit -o compared",
     ),
     no_args_is_help=True,
@@ -52,7 +52,7 @@ SensorOption = Annotated[
     cls=Command,
     epilog=examples(
         "cmpdesign evaluate precision -o precision --trials 10",
-        "cmpdesign evaluate precision -o quick --trials 1 --preset fast",
+        "cmpdesign evaluate precision -o quick --trials 1",
     ),
 )
 def precision(

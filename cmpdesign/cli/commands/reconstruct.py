@@ -15,6 +15,7 @@ from cmpdesign.cli.options.images import (
     MaxPixelsOption,
     PresetOption,
     SideOption,
+    TimesOption,
 )
 from cmpdesign.cli.options.recording import (
     OUTPUT_HELP,
@@ -83,6 +84,7 @@ def reconstruct(
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
+    times: TimesOption = None,
     frames: FramesOption = None,
     cold: Annotated[
         bool, typer.Option("--cold", help="Number every frame without the previous frame: slower.")
@@ -96,7 +98,7 @@ def reconstruct(
     with_images: WithImagesOption = False,
     live: LiveOption = None,
     live_port: LivePortOption = None,
-    live_wait: LiveWaitOption = 0.0,
+    live_wait_s: LiveWaitOption = 0.0,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
     ] = False,
@@ -120,7 +122,7 @@ def reconstruct(
     from extractor import load_layout
 
     known = parse_reading_response(response)
-    shown = (with_images, live, live_port, live_wait)
+    shown = (with_images, live, live_port, live_wait_s, times)
     reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, *shown)
     shape = ShapeOptions(from_rest, flatness_mm, model_px, surface)
     job = ReconstructJob(load_layout(layout), rig, rest, source, output, reading, shape)

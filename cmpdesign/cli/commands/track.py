@@ -16,6 +16,7 @@ from cmpdesign.cli.options.images import (
     PresetOption,
     SideOption,
     SourcesArgument,
+    TimesOption,
 )
 from cmpdesign.cli.options.paths import require_suffix
 from cmpdesign.cli.options.recording import (
@@ -67,6 +68,7 @@ def track(
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
+    times: TimesOption = None,
     frames: FramesOption = None,
     overlay: Annotated[
         Path | None, typer.Option(metavar="VIDEO", help="Video of the found markers: .mp4, .avi or .mkv.")
@@ -86,7 +88,7 @@ def track(
     with_images: WithImagesOption = False,
     live: LiveOption = None,
     live_port: LivePortOption = None,
-    live_wait: LiveWaitOption = 0.0,
+    live_wait_s: LiveWaitOption = 0.0,
     recover: Annotated[
         bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
     ] = False,
@@ -109,7 +111,7 @@ def track(
     from extractor import load_layout
 
     known = parse_reading_response(response)
-    shown = (with_images, live, live_port, live_wait)
+    shown = (with_images, live, live_port, live_wait_s, times)
     reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, *shown)
     job = TrackJob(load_layout(layout), tuple(source), output, reading, rest, mm_per_px, overlay, quiver)
     run = job.prepare()

@@ -14,7 +14,7 @@ class QualityPart(Part):
 
     blur_px: float | None = Field(description="Sigma of the Gaussian that optics and pixel make together.")
     noise: float | None = Field(description="Standard deviation of the noise, in 255ths.")
-    contrast: float | None = Field(description="Contrast between the weakest inks, in 255ths.")
+    contrast: float | None = Field(description="Color difference of the two inks that differ least, CIE76.")
     clipping: float | None = Field(description="Share of the cells that are overexposed.")
     evenness: float | None = Field(description="Evenness of the light, 0 to 1.")
     edge_px: float | None = Field(description="Median length of a gridline, px.")

@@ -58,6 +58,19 @@ class LivePart(Part):
     failure: str = Field(description="Why the server stopped before the end.")
 
 
+class TimesPart(Part):
+    """How the times of the frames were found."""
+
+    of: Literal["names", "numbers", "index", "table", "video", "camera", "arrival", "none"]
+    text: str
+    began: str | None = Field(description="When time_s was 0, UTC.")
+    began_unix_s: float | None
+    began_of: Literal["names", "table", "file", "clock"] | None = Field(
+        description="file: the time of creation of a video, in whole seconds; some phones write its end."
+    )
+    camera_clock_s: float | None = Field(description="The camera's own clock when time_s was 0.")
+
+
 class TrackDocument(Document):
     """The summary of ``track``; also the file FILE.summary.json."""
 
@@ -82,6 +95,7 @@ class TrackDocument(Document):
     )
     jitter_pairs: int
     largest_displacement: LargestPart | None
+    times: TimesPart
     live: LivePart | None = Field(None, description="With --live.")
     written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
 
@@ -122,6 +136,7 @@ class ReconstructDocument(Document):
     warnings: tuple[str, ...]
     positions: PositionsPart
     largest_displacement: LargestPart | None
+    times: TimesPart
     live: LivePart | None = Field(None, description="With --live.")
     written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
 

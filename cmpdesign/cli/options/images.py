@@ -31,7 +31,7 @@ SideOption = Annotated[
 ]
 
 PresetOption = Annotated[
-    Literal["fast", "balanced", "accurate"],
+    Literal["balanced", "accurate"],
     typer.Option("--preset", help="Speed or accuracy of the positions; the ids are the same."),
 ]
 
@@ -42,5 +42,15 @@ SourcesArgument = Annotated[
     typer.Argument(
         metavar="SOURCE",
         help='Pictures, folders, patterns such as "run*/*.png", a video, a camera\'s number, or rtsp://...',
+    ),
+]
+
+TimesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--times",
+        metavar="names|index|FILE",
+        help="Times of the frames: the names' numbers, the count, or a .csv of FRAME,SECONDS. [default: what the names "
+        "say; a video's own]",
     ),
 ]

@@ -58,7 +58,7 @@ class MarkersTable(_Table):
     """[markers]: the reading of the markers from the encoded picture."""
 
     read: bool = True
-    preset: Literal["fast", "balanced", "accurate"] = "balanced"
+    preset: Literal["balanced", "accurate"] = "balanced"
 
 
 class PlanTable(_Table):

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from cmpdesign import __version__
 from cmpdesign.data.files.tables import Row, lost_values, marker_values
 from cmpdesign.data.folder import FORMAT_EXTRACTION, Prepared, file_digest, plan_digest
-from cmpdesign.data.videos.pieces import Piece, VideoFrame, piece_frames, video_pieces
+from cmpdesign.data.videos.pieces import NumberedFrame, Piece, piece_frames, video_pieces
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import ImageFileError, is_image_file, read_image
 from cmpdesign.files.layout_json import layout_to_json
@@ -157,7 +157,7 @@ def _extractor(layout: Path, reading: Reading) -> Extractor:
     return Extractor(load_layout(layout), reading.preset, reading.response, reading.side, reading.channels)
 
 
-def _frames(source: Mapping[str, Any], piece: Piece) -> Iterator[VideoFrame]:
+def _frames(source: Mapping[str, Any], piece: Piece) -> Iterator[NumberedFrame]:
     if source["kind"] == "video":
         yield from piece_frames(Path(source["location"][0]), piece)
         return
@@ -166,4 +166,4 @@ def _frames(source: Mapping[str, Any], piece: Piece) -> Iterator[VideoFrame]:
             image = read_image(source["location"][number])
         except ImageFileError:
             image = None
-        yield VideoFrame(number, float("nan"), image)
+        yield NumberedFrame(number, float("nan"), image)

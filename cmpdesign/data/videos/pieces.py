@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import chain
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from cmpdesign.inputs.sources import SourceError
+from cmpdesign.inputs.videos import VideoFrame, decoded_frames, is_bare, opened_video, packets_of
 from cmpdesign.libraries import extra
 
 START = -(1 << 62)  # of the first piece
@@ -37,16 +36,9 @@ class Piece:
         return self.end > self.start
 
 
-class _Decoded(NamedTuple):
-    """The time of a frame, s, and its image, if it can be decoded."""
-
-    time_s: float
-    image: Any
-
-
 @dataclass(frozen=True, eq=False)
-class VideoFrame:
-    """A frame of a video; ``image`` (H, W, 3) uint8 BGR, None where it cannot be decoded; ``time_s`` from its stamp."""
+class NumberedFrame:
+    """A frame of a source by its number; see ``VideoFrame``."""
 
     number: int
     time_s: float
@@ -56,23 +48,29 @@ class VideoFrame:
 def video_pieces(path: Path, most_frames: int) -> list[Piece]:
     """Cut a video at key frames into pieces of ``most_frames`` frames or a little more, without decoding it.
 
-    A file whose packets have no time stamps cannot be cut: it is decoded once to count its frames, and is one piece.
+    A file whose packets have no time stamps, or whose time stamps go back, cannot be cut: it is decoded once to count
+    its frames, and is one piece.
 
     Raises:
         SourceError: the file cannot be opened, or holds no video.
     """
     stamps: list[int] = []
     keys: list[int] = []
-    with _opened(path) as container:
-        for packet in _packets(container):
+    decoding: list[int] = []
+    with opened_video(path) as container:
+        is_cut = not is_bare(container)
+        for packet in packets_of(container) if is_cut else ():
+            decoding += [] if packet.dts is None else [packet.dts]
             if packet.pts is None:
+                is_cut = False
                 break
-            stamps.append(packet.pts)
-            if packet.is_keyframe:
-                keys.append(packet.pts)
-        else:
-            return _cut(sorted(stamps), sorted(keys), most_frames)
-    return [Piece(0, sum(1 for _ in _unstamped_frames(path)))]
+            if not packet.is_discard:
+                stamps.append(packet.pts)
+                keys += [packet.pts] if packet.is_keyframe else []
+    if is_cut and all(one <= other for one, other in pairwise(decoding)):
+        return _cut(sorted(stamps), sorted(keys), most_frames)
+    count = sum(1 for _ in _piece_frames(path, Piece(0, 0)))
+    return [Piece(0, count)] if count else []
 
 
 def _cut(stamps: list[int], keys: list[int], most_frames: int) -> list[Piece]:
@@ -94,47 +92,27 @@ def _cut(stamps: list[int], keys: list[int], most_frames: int) -> list[Piece]:
     ]
 
 
-def piece_frames(path: Path, piece: Piece) -> Iterator[VideoFrame]:
+def piece_frames(path: Path, piece: Piece) -> Iterator[NumberedFrame]:
     """The frames of a piece in the order of their time stamps, also those that cannot be decoded.
 
     Raises:
         SourceError: the file cannot be opened.
     """
-    found = _stamped_frames(path, piece) if piece.has_stamps else _unstamped_frames(path)
-    for place, (stamp_s, image) in enumerate(found):
-        yield VideoFrame(piece.first + place, stamp_s, image)
+    for place, frame in enumerate(_piece_frames(path, piece)):
+        yield NumberedFrame(piece.first + place, frame.time_s, frame.image)
 
 
-def _stamped_frames(path: Path, piece: Piece) -> Iterator[_Decoded]:
-    with _opened(path) as container:
-        stream = container.streams.video[0]
-        if piece.start != START:
-            _seek(container, stream, piece.start)
-        waiting: list[int] = []  # stamps whose frame has not been decoded yet
-        for packet in chain(_packets(container), [None]):  # None: the last frames that the decoder holds
-            if packet is not None and packet.pts is not None and piece.start <= packet.pts < piece.end:
-                bisect.insort(waiting, packet.pts)
-            for frame in _decoded(stream, packet):
-                while waiting and waiting[0] < frame.pts:
-                    yield _Decoded(_seconds(stream, waiting.pop(0)), None)
-                if frame.pts >= piece.end:
+def _piece_frames(path: Path, piece: Piece) -> Iterator[VideoFrame]:
+    with opened_video(path) as container:
+        if piece.has_stamps and piece.start != START:
+            _seek(container, container.streams.video[0], piece.start)
+        for frame in decoded_frames(container, packets_of(container)):
+            if piece.has_stamps and frame.stamp is not None:
+                if frame.stamp >= piece.end:
                     return
-                if waiting and waiting[0] == frame.pts:
-                    yield _Decoded(_seconds(stream, waiting.pop(0)), frame.to_ndarray(format="bgr24"))
-        for stamp in waiting:
-            yield _Decoded(_seconds(stream, stamp), None)
-
-
-def _unstamped_frames(path: Path) -> Iterator[_Decoded]:
-    """All frames that can be decoded, in their order, with times by the file's frame rate."""
-    with _opened(path) as container:
-        stream = container.streams.video[0]
-        rate = float(stream.average_rate or 0)
-        number = 0
-        for packet in chain(_packets(container), [None]):
-            for frame in _decoded(stream, packet):
-                yield _Decoded(number / rate if rate else float("nan"), frame.to_ndarray(format="bgr24"))
-                number += 1
+                if frame.stamp < piece.start:
+                    continue
+            yield frame
 
 
 def _seek(container: Any, stream: Any, start: int) -> None:
@@ -144,56 +122,8 @@ def _seek(container: Any, stream: Any, start: int) -> None:
 
     try:
         container.seek(start, stream=stream, backward=True)
-        first = next(_packets(container), None)
-        good = first is not None and first.is_keyframe and first.pts <= start
+        first = next(packets_of(container), None)
+        good = first is not None and first.is_keyframe and first.pts is not None and first.pts <= start
         container.seek(start if good else 0, stream=stream, backward=True)
     except av.FFmpegError:
         container.seek(0)
-
-
-def _packets(container: Any) -> Iterator[Any]:
-    """The packets with frames that are shown, up to the first damage of the file."""
-    with extra("data"):
-        import av
-
-    with suppress(av.FFmpegError):
-        for packet in container.demux(container.streams.video[0]):
-            if packet.size and not packet.is_discard:
-                yield packet
-
-
-def _decoded(stream: Any, packet: Any) -> list[Any]:
-    """The frames that a packet completes; none of a damaged packet."""
-    with extra("data"):
-        import av
-
-    try:
-        frames = stream.codec_context.decode(packet)
-    except (av.FFmpegError, EOFError):
-        return []
-    return [frame for frame in frames if not frame.is_corrupt]
-
-
-def _seconds(stream: Any, stamp: int) -> float:
-    return float((stamp - (stream.start_time or 0)) * stream.time_base)
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """A container with one video, decoded by one thread: the processes share the cores."""
-    with extra("data"):
-        import av
-
-    try:
-        container = av.open(str(path))
-    except (av.FFmpegError, OSError, ValueError) as error:
-        raise SourceError(f"{path} is no video that can be read ({_reason(error)})") from None
-    with container:
-        if not container.streams.video:
-            raise SourceError(f"{path}: holds no video")
-        container.streams.video[0].codec_context.thread_count = 1
-        yield container
-
-
-def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error)

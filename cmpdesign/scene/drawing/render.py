@@ -17,6 +17,7 @@ from cmpdesign.scene.drawing.coverage import Engine, draw_coverage
 from cmpdesign.scene.drawing.encoding import encode_planes
 from cmpdesign.scene.drawing.occlusion import update_hidden_parts
 from cmpdesign.scene.drawing.paths import join_segments, project_polygons
+from cmpdesign.scene.drawing.relief import seen_polygons
 from cmpdesign.scene.drawing.view import SceneView, scene_views
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.parts.damage import Blob, Damage, Scratch, bleed_polygons, sample_missing_cells
@@ -149,21 +150,25 @@ def _draw_pattern(
     bleed_mm = scene.damage.bleed_mm if scene.damage else 0.0
     if bleed_mm:
         polygons = bleed_polygons(polygons, bleed_mm, _stream_rng(scene, BLEED_STREAM))
-    # Planes: B, G, R over black, the ground, and with bleeding the sum of the inks' coverage.
+    height_mm = layout.cell_height_mm
+    if height_mm:
+        polygons = seen_polygons(view, polygons, height_mm)
+    overlaps = bool(bleed_mm or height_mm)
+    # Planes: B, G, R over black, the ground, and where cells overlap the sum of the inks' coverage.
     black = _light_bgr(scene, scene.ink(BLACK))
     inks = {
         color: _light_bgr(scene, scene.ink(color)) - black for color in np.unique(layout.cell_color[drawn])
     }
     over_black = np.array([inks[color] for color in layout.cell_color[drawn]]).reshape(-1, 3)
-    values = np.zeros((1 + len(drawn), 5 if bleed_mm else 4))
+    values = np.zeros((1 + len(drawn), 5 if overlaps else 4))
     values[0, 3] = 1.0
     values[1:, :3] = over_black
-    if bleed_mm:
+    if overlaps:
         values[1:, 4] = 1.0
     covered = _draw_polygons(view, [layout.outline_mm[None], polygons], values, scene.blur_px, engine)
 
     colored, ground_share = covered[:3], covered[3]
-    if bleed_mm:
+    if overlaps:
         colored = colored / np.maximum(covered[4], 1.0)
     black_plane = black.astype(np.float32)[:, None, None]
     return np.asarray(colored + background + ground_share * (black_plane - background), dtype=np.float32)

@@ -208,7 +208,8 @@ def _make_surface_map(scene: Scene) -> _SurfaceMap:
 def _make_view(
     scene: Scene, camera: Camera | Pinhole, area: Area, surface_map: _SurfaceMap, size: tuple[int, int]
 ) -> SceneView:
-    if isinstance(camera, Camera) and not surface_map.spatial and scene.medium is None:
+    is_flat = not surface_map.spatial and not scene.layout.cell_height_mm
+    if isinstance(camera, Camera) and is_flat and scene.medium is None:
         return _make_planar_view(scene, camera, area, surface_map, size)
     pinhole = camera if isinstance(camera, Pinhole) else to_pinhole(camera, scene.layout, size)
     straight = surface_map.surface is None and scene.medium is None

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import CmpDesignError, OutputError, parameter
 from cmpdesign.files.atomic import Stage
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.export.lerobot_tables import (
@@ -212,7 +212,7 @@ class _VideoFiles:
             self.shape = self.shape or picture.shape
             if picture.shape != self.shape:
                 raise CmpDesignError(
-                    f"--images {source}: has {picture.shape[1]} x {picture.shape[0]} px, the first source "
+                    f"{parameter('images')} {source}: has {picture.shape[1]} x {picture.shape[0]} px, the first source "
                     f"{self.shape[1]} x {self.shape[0]} px; a data set has one size"
                 )
             self._video.add(picture)

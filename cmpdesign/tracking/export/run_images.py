@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.export.runs import Run
 from cmpdesign.tracking.export.video import pixels_of
@@ -30,7 +30,7 @@ def run_images(run: Run, source: str, most_pixels: int = MOST_PIXELS) -> Iterato
     opened = open_source(source, None, most_pixels)
     if opened.is_live:
         raise CmpDesignError(
-            f"--images {source}: frames of a camera or stream cannot be read again; give a video or "
+            f"{parameter('images')} {source}: frames of a camera or stream cannot be read again; give a video or "
             "a folder of images"
         )
     wanted = set(run.frame.tolist())
@@ -47,7 +47,7 @@ def run_images(run: Run, source: str, most_pixels: int = MOST_PIXELS) -> Iterato
         shape = shape or picture.shape
         if picture.shape != shape:
             raise CmpDesignError(
-                f"--images {source}: frame {index} has {picture.shape[1]} x {picture.shape[0]} px, "
+                f"{parameter('images')} {source}: frame {index} has {picture.shape[1]} x {picture.shape[0]} px, "
                 f"the first {shape[1]} x {shape[0]} px; a video has one size"
             )
         for _ in range(waiting):
@@ -56,7 +56,7 @@ def run_images(run: Run, source: str, most_pixels: int = MOST_PIXELS) -> Iterato
         yield picture
     if found < len(wanted) or waiting:
         raise CmpDesignError(
-            f"--images {source}: has {found - waiting} of the {len(wanted)} frames of {run.path}"
+            f"{parameter('images')} {source}: has {found - waiting} of the {len(wanted)} frames of {run.path}"
         )
 
 
@@ -68,5 +68,5 @@ def require_sources(runs: int, sources: int) -> None:
     """
     if sources not in (0, runs):
         raise CmpDesignError(
-            f"--images is given {sources} times for {runs} runs; give one for each run, in order"
+            f"{parameter('images')} is given {sources} times for {runs} runs; give one for each run, in order"
         )

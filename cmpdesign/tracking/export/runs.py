@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.npz import NpzError, read_npz
 from cmpdesign.tracking.columns import Columns
 from cmpdesign.tracking.recording.points import positions_mm
@@ -34,7 +34,7 @@ class Run:
         path: the file.
         frame: (F,) int64, places in the source.
         arrays: name -> values: displacement_mm and position_mm (F, M, k) float32, NaN where lost; status (F, M) uint8;
-            frame_status (F,) uint8; time_s (F,) float64; with ``--surface`` surface_displacement_mm (F, M, 3) float32.
+            frame_status (F,) uint8; time_s (F,) float64; with ``surface`` surface_displacement_mm (F, M, 3) float32.
     """
 
     path: Path
@@ -110,7 +110,7 @@ def frames_per_second(runs: Sequence[Path]) -> float:
         steps_s.append(step_s[np.isfinite(step_s) & (step_s > 1 / MAX_FPS)])
     every = np.concatenate(steps_s)
     if not len(every):
-        raise CmpDesignError(f"{runs[0]}: no two frames have times; give --fps")
+        raise CmpDesignError(f"{runs[0]}: no two frames have times; give {parameter('fps')}")
     return tidy_fps(1 / float(np.median(every)))
 
 

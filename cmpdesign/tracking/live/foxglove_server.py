@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.libraries import extra
 from cmpdesign.tracking.live.options import HOST
 from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
@@ -63,7 +63,7 @@ class FoxgloveServer:
                 message_backlog_size=BACKLOG_MESSAGES,
             )
         except RuntimeError as error:
-            raise CmpDesignError(f"--live-port {port}: cannot be opened ({error})") from None
+            raise CmpDesignError(f"{parameter('live_port')} {port}: cannot be opened ({error})") from None
         self.address = f"ws://{HOST}:{self._server.port}"
 
     def wait(self, seconds: float) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, get_args
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.tracking.recording.frames import RecordedFrame
 
 HOST = "127.0.0.1"  # this machine only; there is no other choice, because there is no password
@@ -35,16 +35,21 @@ class Live:
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(LiveKind):
-            raise CmpDesignError(f"--live {self.kind!r}: unknown viewer; expected foxglove or rerun")
+            raise CmpDesignError(
+                f"{parameter('live')} {self.kind!r}: unknown viewer; expected foxglove or rerun"
+            )
         if self.port is not None and not 0 <= self.port < 1 << 16:
             raise CmpDesignError(
-                f"--live-port {self.port}: expected a number from 0, for any free port, to 65535"
+                f"{parameter('live_port')} {self.port}: expected a number from 0, for any free port, to 65535"
             )
         if not 0 <= self.wait_s < float("inf"):
-            raise CmpDesignError(f"--live-wait {self.wait_s:g}: expected a number of seconds from 0")
+            raise CmpDesignError(
+                f"{parameter('live_wait_s')} {self.wait_s:g}: expected a number of seconds from 0"
+            )
         if self.wait_s and self.kind == "rerun":
             raise CmpDesignError(
-                "--live-wait: Rerun's server keeps the frames for a viewer that connects later; leave it out"
+                f"{parameter('live_wait_s')}: Rerun's server keeps the frames for a viewer that connects later; "
+                "leave it out"
             )
 
     def free_port(self) -> int:
@@ -62,7 +67,7 @@ class Live:
                 return free
         except OSError as error:
             raise CmpDesignError(
-                f"--live-port {port}: cannot be opened ({error.strerror or error}); "
+                f"{parameter('live_port')} {port}: cannot be opened ({error.strerror or error}); "
                 "end the program that uses it, or give another port"
             ) from None
 

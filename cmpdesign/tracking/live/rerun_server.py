@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.tracking.live.options import HOST
 from cmpdesign.tracking.recording.frames import RecordedFrame
 from cmpdesign.tracking.recording.rerun_rows import APPLICATION, RerunRows, require_rerun
@@ -33,7 +33,7 @@ class RerunServer:
             sink = rerun.GrpcServerSink(HOST, port, server_memory_limit=MEMORY)
             self._stream.set_sinks(sink)
         except RuntimeError as error:
-            raise CmpDesignError(f"--live-port {port}: cannot be opened ({error})") from None
+            raise CmpDesignError(f"{parameter('live_port')} {port}: cannot be opened ({error})") from None
         self._rows = RerunRows(frame_id)
         self.address = f"rerun+http://{HOST}:{port}/proxy"
 

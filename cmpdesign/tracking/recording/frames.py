@@ -99,12 +99,13 @@ class FrameReader:
         """
         records = marker_records(columns, about)
         views = [str(name) for name in about["view_names"]]
+        began_ns = _began_ns(about)
         for place, number in enumerate(columns["frame"].tolist()):
             row = {name: values[place] for name, values in columns.items()}
             level, text = _judge(row)
             yield RecordedFrame(
                 number,
-                self._time_ns(float(row["time_s"])),
+                began_ns + self._time_ns(float(row["time_s"])),
                 records[place],
                 level,
                 text,
@@ -117,6 +118,13 @@ class FrameReader:
         known = np.isfinite(time_s)
         self._last_ns = max(0, round(time_s * NS_PER_S)) if known else self._last_ns + STEP_NS
         return self._last_ns
+
+
+def _began_ns(about: Columns) -> int:
+    """When the frames' times begin, ns since 1970; 0 where only the file's time of creation, or nothing, says it."""
+    began_s = float(about.get("began_unix_s", np.nan))
+    is_exact = str(about.get("began_of", "")) in ("names", "table", "clock")
+    return round(began_s * NS_PER_S) if is_exact and np.isfinite(began_s) else 0
 
 
 def image_places(about: Columns, is_one_a_view: bool) -> list[ImagePlace]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.texts import visible
 from cmpdesign.tracking.columns import Columns, FrameTable
 
@@ -48,7 +48,7 @@ class Recording:
     def __post_init__(self) -> None:
         if not _FRAME_ID.fullmatch(self.frame_id):
             raise CmpDesignError(
-                f"--frame-id {self.frame_id!r}: cannot stand in a ROS topic; "
+                f"{parameter('frame_id')} {self.frame_id!r}: cannot stand in a ROS topic; "
                 "use letters, digits and _, and begin with a letter"
             )
 

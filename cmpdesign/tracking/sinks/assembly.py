@@ -85,9 +85,19 @@ def _write_parquet(chunks: Sequence[Chunk], about: Columns, path: Path) -> None:
                 name: arrow.array(values, from_pandas=values.dtype.kind == "f")
                 for name, values in long.items()
             }
-            table = arrow.table(arrays).replace_schema_metadata({"digest": str(about["digest"])})
+            table = arrow.table(arrays).replace_schema_metadata(_metadata(about))
             writer = writer or arrow.parquet.ParquetWriter(path, table.schema, compression="zstd")
             writer.write_table(table)
     finally:
         if writer is not None:
             writer.close()
+
+
+def _metadata(about: Columns) -> dict[str, str]:
+    """Of a Parquet file: the layout's digest, and when the frames' times begin."""
+    texts: dict[str, str] = {
+        name: str(about[name]) for name in ("digest", "times_of", "began_of") if name in about
+    }
+    if "began_unix_s" in about:
+        texts["began_unix_s"] = repr(float(about["began_unix_s"]))
+    return texts

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from cmpdesign.errors import OutputError
+from cmpdesign.errors import OutputError, parameter
 from cmpdesign.tracking.columns import FrameTable
 from cmpdesign.tracking.recording.images import keep_images
 from cmpdesign.tracking.sinks.assembly import assemble_table
@@ -91,4 +91,4 @@ class ChunkSink:
     def kept(self) -> str:
         if not self._part.exists():
             return f"{self._kept} frames are kept in {self._path}"
-        return f"{self._kept} frames are kept in {self._part}; free disk space, then call with --recover"
+        return f"{self._kept} frames are kept in {self._part}; free disk space, then call with {parameter('recover')}"

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any, Protocol
 
-from cmpdesign.errors import CmpDesignError, OutputError
+from cmpdesign.errors import CmpDesignError, OutputError, parameter
 from cmpdesign.files.atomic import remove_abandoned_stages
 from cmpdesign.files.locks import is_in_use
 from cmpdesign.inputs.files import is_folder, is_regular_file, open_file
@@ -54,7 +54,7 @@ def open_sink(path: Path, table: FrameTable, recording: Recording | None = None)
     _require_kind(path)
     if recording.with_images and not is_recording(path):
         raise CmpDesignError(
-            f"--with-images: {path} is a table and holds no images; "
+            f"{parameter('with_images')}: {path} is a table and holds no images; "
             "give a name that ends in .mcap or .rrd, or without ending"
         )
     part = part_path(path)
@@ -64,7 +64,7 @@ def open_sink(path: Path, table: FrameTable, recording: Recording | None = None)
         _require_not_in_use(part, path)
         if _holds_frames(part):
             raise CmpDesignError(
-                f"{part} holds the frames of an interrupted run; call with --recover, or delete it"
+                f"{part} holds the frames of an interrupted run; call with {parameter('recover')}, or delete it"
             )
     try:
         _remove(part)

@@ -155,7 +155,7 @@ class Missing:
 sys.meta_path.insert(0, Missing())
 """
 # Without these nothing runs at all.
-BASE = {"numpy", "opencv-python-headless", "pydantic", "typer", "rich"}
+BASE = {"numpy", "opencv-contrib-python-headless", "pydantic", "typer", "rich"}
 SMALL = ("build", "honeycomb", "--set", "layers=1", "-o", "out", "--only")
 LIBRARIES = {
     "svgwrite": ("svgwrite", (*SMALL, "svg")),

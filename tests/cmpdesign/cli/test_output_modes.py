@@ -12,7 +12,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cmpdesign import build_layout, load_design, write_layout
+from cmpdesign import build_layout, load, write_layout
 from tests.support.command import refused, run
 
 COMMANDS = {
@@ -31,7 +31,7 @@ every_command = pytest.mark.parametrize("name", COMMANDS)
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    write_layout(build_layout(load_design("honeycomb", {"layers": "3"})), tmp_path / "layout.json")
+    write_layout(build_layout(load("honeycomb", {"layers": "3"})), tmp_path / "layout.json")
     assert run("render", "layout.json", "-o", "seen.png").exit_code == 0
 
 

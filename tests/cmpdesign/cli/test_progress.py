@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from cmpdesign import build_layout, load_design, write_layout
+from cmpdesign import build_layout, load, write_layout
 from cmpdesign.cli import app
 from cmpdesign.watch import told, watched
 
@@ -27,7 +27,7 @@ def progress_of(folder: Path, *words: str, terminal: bool = True) -> str:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("progress")
-    write_layout(build_layout(load_design("honeycomb", {"layers": "3"})), folder / "layout.json")
+    write_layout(build_layout(load("honeycomb", {"layers": "3"})), folder / "layout.json")
     for number in range(3):
         (folder / "frames").mkdir(exist_ok=True)
         words = ["render", f"{folder}/layout.json", "-o", f"{folder}/frames/{number}.png"]

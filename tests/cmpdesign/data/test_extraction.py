@@ -67,13 +67,13 @@ def test_every_frame_is_in_one_part_under_its_number(name: str, tmp_path: Path) 
 
 
 def test_a_file_without_time_stamps_is_one_part(tmp_path: Path) -> None:
-    """Its frames come in their order, at the times of the file's frame rate."""
+    """Its frames come in their order, without times: FFmpeg would invent 25 per second."""
     path = write_numbered(tmp_path / "raw.h264")
     (piece,) = video_pieces(path, 4)
     found = list(piece_frames(path, piece))
     assert (piece.first, piece.frames, piece.has_stamps) == (0, FRAMES, False)
     assert [frame.number for frame in found] == [number_of(frame.image) for frame in found]
-    assert [frame.time_s for frame in found] == pytest.approx([number / 25 for number in range(FRAMES)])
+    assert len(found) == FRAMES and all(np.isnan(frame.time_s) for frame in found)
 
 
 def test_a_damaged_part_costs_its_frames_only(tmp_path: Path) -> None:
@@ -145,8 +145,8 @@ def test_a_source_is_given_once(sources: Path, tmp_path: Path) -> None:
     ("source", "said"),
     [
         ("0", "camera 0: expected files"),
-        ("missing.mp4", "missing.mp4 is no video that can be read"),
-        ("layout.json", "layout.json is no video that can be read"),
+        ("missing.mp4", "missing.mp4: cannot be read (No such file"),
+        ("layout.json", "layout.json is no video: it is a layout file"),
         ("*.mov", "no file matches this pattern"),
     ],
 )

@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 from pydantic import BaseModel
 
-from cmpdesign import Design, DesignError, build_layout, load_design
+from cmpdesign import Design, DesignError, build_layout, load
 from cmpdesign.design.commented_toml import STARTING_VALUES, commented_toml
 from cmpdesign.design.templates import find_template, template_kinds, template_words, templates_folder
 from tests.support.command import refused, run
@@ -63,15 +63,15 @@ def test_a_chain_of_designs_equals_the_design_written_out(tmp_path: Path) -> Non
         'pattern = "honeycomb"\nlayers = 4\npitch_mm = "60mil"\nvirtual_per_edge = 5\nborder_mm = 1\n'
         "mirrored = true\n[laser]\nkerf_mm = 0.2\npasses = 2\n",
     )
-    assert load_design(chained) == load_design(whole)
-    assert build_layout(load_design(chained)).digest == build_layout(load_design(whole)).digest
+    assert load(chained) == load(whole)
+    assert build_layout(load(chained)).digest == build_layout(load(whole)).digest
     written(tmp_path / "base" / "small.toml", 'extends = "tac3d"\nlayers = 5\n')
-    assert build_layout(load_design(chained)).digest != build_layout(load_design(whole)).digest
+    assert build_layout(load(chained)).digest != build_layout(load(whole)).digest
 
 
 def test_none_takes_away_and_what_tells_of_a_file_stays_there(tmp_path: Path) -> None:
     wide = written(tmp_path / "wide.toml", 'extends = "tac3d"\nlayers = "none"\nwidth_mm = 20\n')
-    design = load_design(wide, {"height_mm": "18"})
+    design = load(wide, {"height_mm": "18"})
     assert (design.layers, design.width_mm, design.height_mm, design.mirrored) == (None, 20, 18, True)
     assert (design.name, design.description, design.source) == ("wide", "", "")
 
@@ -98,7 +98,7 @@ def test_what_cannot_be_extended_is_refused(files: dict[str, str], said: str, tm
     for name, text in files.items():
         written(tmp_path / f"{name}.toml", text)
     with pytest.raises(DesignError, match=re.escape(said)):
-        load_design(tmp_path / "a.toml")
+        load(tmp_path / "a.toml")
     assert said in refused("build", tmp_path / "a.toml", "-o", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -117,11 +117,11 @@ def test_editors_know_what_is_extended() -> None:
 def test_a_new_design_is_built(tmp_path: Path) -> None:
     assert run("init", tmp_path / "mine").exit_code == 0
     path = tmp_path / "mine.toml"
-    assert load_design(path) == Design(name="mine", **STARTING_VALUES)
+    assert load(path) == Design(name="mine", **STARTING_VALUES)
     assert run("init", tmp_path / "wider.toml", "--extends", "tac3d").exit_code == 0
-    assert load_design(tmp_path / "wider.toml").model_dump(
-        exclude={"name", "source", "description"}
-    ) == load_design("tac3d").model_dump(exclude={"name", "source", "description"})
+    assert load(tmp_path / "wider.toml").model_dump(exclude={"name", "source", "description"}) == load(
+        "tac3d"
+    ).model_dump(exclude={"name", "source", "description"})
     assert run("init", tmp_path / "more", "--extends", "wider.toml").exit_code == 0
     assert run("build", tmp_path / "more.toml", "--only", "layout", "-o", tmp_path).exit_code == 0
 
@@ -165,7 +165,7 @@ def test_init_keeps_what_is_there(tmp_path: Path) -> None:
     assert "no template" in refused("init", tmp_path / "other", "--extends", "nosuch")
     assert "extends itself" in refused("init", path, "--extends", "mine.toml", "--force")
     assert path.read_text(encoding="utf-8") == "# by hand\n" and list(tmp_path.iterdir()) == [path]
-    assert run("init", path, "--force").exit_code == 0 and load_design(path).layers == 10
+    assert run("init", path, "--force").exit_code == 0 and load(path).layers == 10
 
 
 # -- templates

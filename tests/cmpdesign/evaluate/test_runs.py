@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +113,27 @@ def test_the_code_digest_knows_every_file(tmp_path: Path, monkeypatch: pytest.Mo
     (package / "notes.txt").write_text("nothing that runs")
     found.append(digest())
     assert found[0] == found[1] and found[4] == found[5] and len(set(found)) == 4
+
+
+def test_the_code_digest_knows_the_compiled_loops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loops that are compiled anew make another digest, as changed Python does."""
+    package = tmp_path / "measured_loops"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    module = package / f"_native{EXTENSION_SUFFIXES[0]}"
+    digest = journal.code_digest.__wrapped__
+    monkeypatch.syspath_prepend(str(tmp_path))
+    found = []
+    for native in ("extractor._native", "cmpdesign._native"):
+        names = [name.replace(native, "measured_loops._native") for name in journal.HASHED_PACKAGES]
+        assert names.count("measured_loops._native") == 1
+        monkeypatch.setattr(journal, "HASHED_PACKAGES", tuple(names))
+        for loops in (b"one", b"other"):
+            module.write_bytes(loops)
+            found.append(digest())
+        monkeypatch.undo()
+        monkeypatch.syspath_prepend(str(tmp_path))
+    assert len(set(found)) == 4
 
 
 def test_two_runs_in_one_folder_do_not_meet(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.side import seen_side, turned_over
 from cmpdesign.products.as_made.made_pad import cut_by_later, make_pad
@@ -123,7 +123,7 @@ def test_predicted_cells_are_those_of_the_written_files(mirrored: str, tmp_path:
 
 def test_sides() -> None:
     assert (seen_side(True), seen_side(False)) == ("back", "front")
-    layout = build_layout(load_design("gelsight-mini"))
+    layout = build_layout(load("gelsight-mini"))
     assert turned_over(turned_over(layout)).digest == layout.digest
     np.testing.assert_array_equal(turned_over(layout).marker_xy_mm, layout.marker_xy_mm * (-1, 1))
 
@@ -141,7 +141,7 @@ def test_a_deviation_names_its_parameter_and_what_cannot_be_read_is_an_error(tmp
     assert result.exit_code == 0
     text = " ".join(result.stdout.split())
     assert "change laser.face" in text and "change mold.gap_mm" in text
-    layout = build_layout(load_design("honeycomb", {"layers": "3"}))
+    layout = build_layout(load("honeycomb", {"layers": "3"}))
     outlines = list(layout.colored_outlines_mm)
     small = make_pad(
         layout, "mold", [ring.mean(axis=0) + 0.2 * (ring - ring.mean(axis=0)) for ring in outlines]

@@ -269,7 +269,7 @@ def test_nothing_tracked_is_exit_code_1(made: Path, tmp_path: Path) -> None:
     ("source", "options", "expected"),
     [
         ("missing.avi", (), "no such file or folder"),
-        ("layout.json", (), "is not a video that can be read"),
+        ("layout.json", (), "is no video: it is a layout file"),
         ("empty", (), "holds no image"),
         ("video.avi", ("-o", "a.txt"), "unknown ending; expected one of .npz, .parquet, .csv"),
         ("video.avi", ("--rest", "99"), "has fewer frames"),

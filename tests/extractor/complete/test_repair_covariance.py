@@ -25,7 +25,6 @@ def damage_readings(preset: str) -> list[PictureReading]:
     "preset",
     [
         "balanced",
-        pytest.param("fast", marks=pytest.mark.slow),
         pytest.param("accurate", marks=pytest.mark.slow),
     ],
 )

@@ -130,11 +130,11 @@ def move_a_marker(document: dict[str, Any]) -> None:
 
 WRONG: dict[str, tuple[Damage, str]] = {
     "other format": (put("format", to="svg"), "format is 'svg'; expected 'cmp-layout'"),
-    "other version": (put("version", to=2), "version is 2; expected 1"),
-    "version as truth": (put("version", to=True), "version is true; expected 1"),
-    "version as float": (put("version", to=1.0), "version is 1.0; expected 1"),
+    "other version": (put("version", to=3), "version is 3; expected 1 or 2"),
+    "version as truth": (put("version", to=True), "version is true; expected 1 or 2"),
+    "version as float": (put("version", to=1.0), "version is 1.0; expected 1 or 2"),
     "other units": (put("units", to="inch"), "units is 'inch'; expected 'mm'"),
-    "no version": (drop("version"), "version is missing; expected 1"),
+    "no version": (drop("version"), "version is missing; expected 1 or 2"),
     "no markers": (drop("markers"), "markers is missing"),
     "no column": (drop("markers", "x"), "markers.x is missing"),
     "unknown field": (put("color", to=1), "'color' is unknown"),
@@ -391,6 +391,34 @@ def test_what_is_known_of_a_pad_as_made_is_written_as_it_is_read(left_out: tuple
     assert json.loads(layout_to_json(layout)) == document
     cells = len(layout.colored_cells)
     assert layout.colored_outlines_mm.shape == (cells, 3, 2)
+
+
+@pytest.mark.parametrize("height_mm", [-0.25, 0.1])
+def test_relief_is_version_2(height_mm: float) -> None:
+    """A file with cells of a height is written as it is read, and no file of version 1 has such cells."""
+    document = made_document()
+    document["as_made"]["cell_height_mm"] = height_mm
+    document["version"] = 2
+    VALIDATOR.validate(document)
+    reference = parse_layout(json.dumps(document))
+    assert reference.as_made is not None and reference.as_made.cell_height_mm == height_mm
+    assert json.loads(layout_to_json(layout_from_reference(reference))) == document
+    document["version"] = 1
+    assert not VALIDATOR.is_valid(document)
+    assert re.search(
+        "as_made.cell_height_mm is given in a file of version 1; expected version 2",
+        refused(json.dumps(document)),
+    )
+
+
+@pytest.mark.parametrize("height_mm", [10.5, "0.1", True, None, [0.1]])
+def test_a_wrong_height_of_cells_is_one_clear_line(height_mm: object) -> None:
+    document = made_document() | {"version": 2}
+    document["as_made"]["cell_height_mm"] = height_mm
+    assert not VALIDATOR.is_valid(document)
+    assert re.search(
+        "as_made.cell_height_mm is .*; expected a number from -10 to 10 mm", refused(json.dumps(document))
+    )
 
 
 @pytest.mark.parametrize(

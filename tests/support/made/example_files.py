@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 from numpy.typing import NDArray
 
-from cmpdesign import load_design, write_layout
+from cmpdesign import load, write_layout
 from cmpdesign.files.images import read_image
 from cmpdesign.products.laser.coupon.design import coupon_to_json, design_coupon
 from cmpdesign.products.laser.setup import complete_setup
@@ -75,7 +75,7 @@ def _write_video(path: Path, images: Sequence[NDArray[Any]]) -> None:
 
 
 def _write_coupon(folder: Path) -> None:
-    piece = design_coupon(complete_setup(load_design("honeycomb").laser))
+    piece = design_coupon(complete_setup(load("honeycomb").laser))
     photo = coupon_photo(piece, {patch.name: (0.1, 0.12) for patch in piece.patches}, scale_px_mm=11.8)
     (folder / "coupon.json").write_text(coupon_to_json(piece), encoding="utf-8")
     for name in ("scan.png", "photo.jpg"):

@@ -150,7 +150,9 @@ def load_coupon(path: str | Path) -> Coupon:
     try:
         return _parse_coupon(parse_json(read_text(path, _MAX_BYTES), str(path)))
     except InputError as error:
-        raise CouponError(f"{error}; expected a coupon.json as build writes it with --only laser") from None
+        raise CouponError(
+            f"{error}; expected a coupon.json as build writes it for the product laser"
+        ) from None
     except ValidationError as error:
         message = validation_message(error, _CouponFile)
         raise CouponError(f"{path}: {message}; expected a coupon.json as build writes it") from None

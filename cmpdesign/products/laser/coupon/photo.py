@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.errors import parameter
 from cmpdesign.files.images import Image
 from cmpdesign.products.laser.coupon.design import Coupon, Face, Patch
 from cmpdesign.products.laser.coupon.edges import read_edges
@@ -188,6 +189,6 @@ def _require_open_cuts(coupon: Coupon, reading: CouponReading) -> None:
                 raise PhotoError(
                     f"patch {one.patch.name}: {seen.value_mm:.3f} mm at the {reading.face} would be {narrow:.3f} mm "
                     f"at the {coupon.narrow_face} by the taper of {coupon.taper_deg:g} degrees through "
-                    f"{coupon.thickness_mm:g} mm, limit 0 mm; leave --face out where the ground shows through the "
-                    "cuts, or correct laser.taper_deg and build the coupon.json again"
+                    f"{coupon.thickness_mm:g} mm, limit 0 mm; leave {parameter('face')} out where the ground "
+                    "shows through the cuts, or correct laser.taper_deg and build the coupon.json again"
                 )

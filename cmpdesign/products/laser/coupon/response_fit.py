@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmpdesign.errors import parameter
 from cmpdesign.products.laser.coupon.edge_model import EdgeFit, EdgeModel, bin_deviations
 from cmpdesign.products.laser.coupon.edges import EdgeValues
 from cmpdesign.products.laser.coupon.picture import PhotoError, Values
@@ -76,8 +77,9 @@ def hold_response(read: KerfReader, edges: EdgeValues, response: Response) -> Re
     limit = LARGEST_MISFIT * float(np.hypot(fit.sigma, STATED_DEVIATION))
     if abs(fit.exponent - 1) > limit:
         raise PhotoError(
-            f"by --response {response} the light of the edges is off by an exponent of {fit.exponent:.2f}, limit 1 +- "
-            f"{limit:.2f}; leave --response out, or scan without sharpening and automatic contrast"
+            f"by {parameter('response')} {response} the light of the edges is off by an exponent of "
+            f"{fit.exponent:.2f}, limit 1 +- {limit:.2f}; leave {parameter('response')} out, or scan without "
+            "sharpening and automatic contrast"
         )
     return ResponseFit(read(response), f"{response_name(response)}, as stated")
 
@@ -100,7 +102,7 @@ def fit_response(read: KerfReader, edges: EdgeValues, expected: Sequence[Respons
         raise PhotoError(
             f"the edges are symmetric for an exponent of {EXPONENT * best.exponent:.2f}, expected "
             f"{' or '.join(map(response_name, expected))} or 2.2 +- 0.5: the picture has been sharpened or its "
-            "contrast changed; scan without sharpening and contrast, or state --response"
+            f"contrast changed; scan without sharpening and contrast, or state {parameter('response')}"
         )
     logs = np.array([one.log_weight for one in candidates])
     weights = np.exp(logs - logs.max())

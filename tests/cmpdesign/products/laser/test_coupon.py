@@ -75,7 +75,7 @@ def test_blur_does_not_change_widths_in_light(response: Any, blur_px: float) -> 
 def test_a_false_response_is_seen_in_the_edges() -> None:
     photo = coupon_photo(PIECE, CUT, noise=1.0, response=2.2)
     with pytest.raises(
-        PhotoError, match="by --response linear the light of the edges is off by an exponent of"
+        PhotoError, match="by response linear the light of the edges is off by an exponent of"
     ):
         read_coupon(PIECE, photo, response="linear")
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.products.mold.cad import mold_parts, pad_parts
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.stack.stack import make_stack
@@ -25,7 +25,7 @@ def by_label(compound: Any) -> dict[str, Any]:
 def test_the_mold_is_one_compound_of_labelled_colored_located_parts(tmp_path: Path) -> None:
     from build123d import export_step, import_step
 
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     stack = make_stack(design, build_layout(design))
     mold = mold_parts(design)
     parts = {part.name: part for part in make_parts(stack)}
@@ -70,7 +70,7 @@ def overlap(first: Any, second: Any) -> bool:
 @pytest.mark.parametrize("crown", ["flat", "sphere"])
 def test_the_pad_is_its_silicone_layers_on_each_other(crown: str) -> None:
     values = {"mold.crown": crown, "mold.crown_radius_mm": "20"} if crown != "flat" else {}
-    design = load_design("honeycomb", {"layers": "2", **values})
+    design = load("honeycomb", {"layers": "2", **values})
     layers = by_label(pad_parts(design))
     assert list(layers) == ["base", "marker", "cover"]
     option = design.mold

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.products.mold import make
 from cmpdesign.products.mold.checks.findings import facet_sag_mm
 from cmpdesign.products.mold.parts import Part, make_parts
@@ -38,7 +38,7 @@ GROUPS = ("1-base", "2-emboss-red", "3-fill-red", "-cover")
 
 @cache
 def parts(name: str) -> dict[str, Part]:
-    design = load_design("honeycomb", DESIGNS[name])
+    design = load("honeycomb", DESIGNS[name])
     return {part.name: part for part in make_parts(make_stack(design, build_layout(design)))}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.products.mesh.picture import ABOVE, BELOW, ViewDirection, draw_meshes
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf, read_3mf
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
@@ -28,7 +28,7 @@ from cmpdesign.products.registry import ProductFiles
 
 @pytest.fixture(scope="module")
 def made() -> ProductFiles:
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     return make_meshes(design, build_layout(design))
 
 
@@ -60,7 +60,7 @@ def test_volumes_are_the_analytic_ones(made: ProductFiles) -> None:
 
 
 def test_layers_fill_the_pad_without_gap_or_overlap() -> None:
-    design = load_design("round", {"layers": "3"})
+    design = load("round", {"layers": "3"})
     stack = make_stack(design, build_layout(design))
     volumes = {mesh.name: mesh.volume_mm3() for mesh, _ in pad_meshes(stack)}
     middle = sum(volumes[name] for name in ("black", "red", "green", "blue", "white"))
@@ -90,14 +90,14 @@ def test_an_open_mesh_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(RuntimeError, match="tent: the mesh is not closed"):
         meshes_to_3mf([tent], "tent")
     monkeypatch.setattr(product, "pad_meshes", lambda stack: [(tent, tent.volume_mm3())])
-    design = load_design("honeycomb", {"layers": "1"})
+    design = load("honeycomb", {"layers": "1"})
     with pytest.raises(MoldError, match="tent: watertight False"):
         make_meshes(design, build_layout(design))
 
 
 @pytest.mark.parametrize("crown", ["sphere", "cylinder"])
 def test_crowned_meshes_are_closed(crown: str) -> None:
-    design = load_design("honeycomb", {"layers": "2", "mold.crown": crown, "mold.crown_radius_mm": "15"})
+    design = load("honeycomb", {"layers": "2", "mold.crown": crown, "mold.crown_radius_mm": "15"})
     stack = make_stack(design, build_layout(design))
     made = [(mesh, volume, 1e-9) for mesh, volume in pad_meshes(stack)]
     for mesh, volume, tolerance in made + [make_part_mesh(part) for part in make_parts(stack)]:
@@ -107,7 +107,7 @@ def test_crowned_meshes_are_closed(crown: str) -> None:
 
 
 def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
-    design = load_design("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
+    design = load("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
     stack = make_stack(design, build_layout(design))
     page = job_sheet_html("dome", stack, make_parts(stack), [])
     assert "flush" not in page and "wipe along the dome" in page
@@ -116,7 +116,7 @@ def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
 
 
 def test_pictures_show_bosses_from_above_only() -> None:
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     plate = next(
         part for part in make_parts(make_stack(design, build_layout(design))) if part.name == "boss-red"
     )
@@ -140,7 +140,7 @@ def test_every_part_has_its_pictures(made: ProductFiles) -> None:
 
 
 def test_exploded_parts_lie_above_each_other_and_apart() -> None:
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     parts = make_parts(make_stack(design, build_layout(design)))
     groups = exploded_meshes(parts, [make_part_mesh(part)[0] for part in parts])
     assert list(groups)[:3] == ["base", "pin", "frame"] and len(groups["pin"]) == 4

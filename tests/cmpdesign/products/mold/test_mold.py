@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.errors import DesignError
 from cmpdesign.products.mold import make, pad, processes
 from cmpdesign.products.mold.checks.findings import check_mold, require_no_errors
@@ -51,7 +51,7 @@ DESIGNS = {
 
 
 def stack(**values: str) -> MoldStack:
-    design = load_design("honeycomb", values)
+    design = load("honeycomb", values)
     return make_stack(design, build_layout(design))
 
 
@@ -147,7 +147,7 @@ def test_no_turn_or_flip_of_a_part_fits_the_pins(pattern: str) -> None:
 def test_pins_are_where_the_laser_has_its_fiducials() -> None:
     """The laser's sheet lies on the pins as it was carved for a pad that is seen from the back, else turned over."""
     for mirrored, sign in (("true", 1.0), ("false", -1.0)):
-        design = load_design("honeycomb", {"layers": "3", "mirrored": mirrored})
+        design = load("honeycomb", {"layers": "3", "mirrored": mirrored})
         layout = build_layout(design)
         mold = make_stack(design, layout)
         np.testing.assert_array_equal(mold.pins_mm[:3], layout.fiducials_mm * (sign, 1.0))
@@ -213,7 +213,7 @@ def test_what_cannot_be_made_is_refused_before_any_solid(
 ) -> None:
     values, message = IMPOSSIBLE[name]
     nothing_is_built(monkeypatch)
-    design = load_design("honeycomb", {"layers": "3", **values})
+    design = load("honeycomb", {"layers": "3", **values})
     with pytest.raises(DesignError, match=message):
         product(design, build_layout(design))
 
@@ -233,7 +233,7 @@ def nothing_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("product", [make.make_mold, make_meshes])
 def test_building_would_be_seen(product: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     nothing_is_built(monkeypatch)
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     with pytest.raises(pytest.fail.Exception, match="geometry was built"):
         product(design, build_layout(design))
 
@@ -323,7 +323,7 @@ def test_tiles_hold_few_holes_whatever_the_pattern() -> None:
 
 def test_no_line_crosses_the_arc_at_a_tip_twice() -> None:
     """Tips of the cells of this ellipse lie at many heights."""
-    design = load_design("digit")
+    design = load("digit")
     plates = [
         part for part in make_parts(make_stack(design, build_layout(design))) if part.name == "boss-blue"
     ]
@@ -331,9 +331,7 @@ def test_no_line_crosses_the_arc_at_a_tip_twice() -> None:
 
 
 def test_uprights_stay_within_a_slanted_pad() -> None:
-    design = load_design(
-        "square", {"layers": "3", "rotation_deg": "20", "pitch_mm": "2.673", "border_mm": "0.8"}
-    )
+    design = load("square", {"layers": "3", "rotation_deg": "20", "pitch_mm": "2.673", "border_mm": "0.8"})
     for mesh, volume in pad.pad_meshes(make_stack(design, build_layout(design))):
         assert mesh.volume_mm3() == pytest.approx(volume, rel=1e-9), mesh.name
 
@@ -344,7 +342,7 @@ def test_frustum_of_circles() -> None:
 
 
 def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> None:
-    design = load_design("honeycomb", {"layers": "3"})
+    design = load("honeycomb", {"layers": "3"})
     layout = build_layout(design)
     alone = make.make_mold(design, layout)
     monkeypatch.setattr(processes, "MIN_BOSSES_FOR_TWO", 0)
@@ -361,7 +359,7 @@ def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_helper_that_fails_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     monkeypatch.setattr(processes, "MIN_BOSSES_FOR_TWO", 0)
     monkeypatch.setattr(processes, "available_cores", lambda: 2)
     monkeypatch.setattr(processes, "__name__", "cmpdesign.mold.absent")
@@ -370,7 +368,7 @@ def test_a_helper_that_fails_is_an_error(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_assembly_holds_every_part_where_it_is_used() -> None:
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     layout = build_layout(design)
     content = make.make_mold(design, layout).files["mold/assembly.step"]
     assert isinstance(content, bytes)
@@ -411,7 +409,7 @@ def volume_and_centre(shape: object) -> tuple[float, np.ndarray]:
 def test_build123d_reads_names_colors_and_places(tmp_path: Path) -> None:
     from build123d import import_step
 
-    design = load_design("honeycomb", {"layers": "2"})
+    design = load("honeycomb", {"layers": "2"})
     files = make.make_mold(design, build_layout(design)).files
     for name in ("boss-red", "assembly"):
         content = files[f"mold/{name}.step"]

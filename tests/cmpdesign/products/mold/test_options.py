@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.design.mold_options import MoldOptions
 from cmpdesign.design.sheet_options import SheetOptions
 from cmpdesign.products.mold.checks.findings import check_mold
@@ -32,7 +32,7 @@ SHEET = {"page": "letter", "pads": "2", "bleed_mm": "1", "film": "clear"}
 
 def made_of(**values: str) -> tuple[object, list[str]]:
     """The figures of the parts from closed forms, and the findings on the parts."""
-    design = load_design("honeycomb", {"layers": "3", **values})
+    design = load("honeycomb", {"layers": "3", **values})
     stack = make_stack(design, build_layout(design))
     parts = [(part.name, round(part.z_mm, 9), round(part.volume_mm3, 9)) for part in make_parts(stack)]
     return (parts, mold_figures(stack)["pour_mm3"]), [str(finding) for finding in check_mold(stack)]
@@ -70,7 +70,7 @@ def test_options_that_are_not_used_are_named() -> None:
 @pytest.mark.parametrize("field", SHEET)
 def test_every_option_of_a_sheet_has_an_effect(field: str) -> None:
     def sheet(**values: str) -> str | bytes:
-        design = load_design("honeycomb", {"layers": "3", **values})
+        design = load("honeycomb", {"layers": "3", **values})
         return make_print_sheet(design, build_layout(design)).files["print/sheet.svg"]
 
     assert sheet(**{f"sheet.{field}": SHEET[field]}) != sheet()

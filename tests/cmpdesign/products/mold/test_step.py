@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.solids.measure import measure_solid, volume_mm3
 from cmpdesign.products.mold.stack.stack import make_stack
@@ -20,7 +20,7 @@ CROWNS = ("flat", "sphere", "cylinder")
 
 def solids(crown: str) -> dict[str, Any]:
     values = {"mold.crown": crown, "mold.crown_radius_mm": "12"} if crown != "flat" else {}
-    design = load_design("honeycomb", {"layers": "2", **values})
+    design = load("honeycomb", {"layers": "2", **values})
     return {part.name: part.solid for part in make_parts(make_stack(design, build_layout(design)))}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout, load
 from cmpdesign.cli import app
 from cmpdesign.design.design import Design
 from cmpdesign.errors import DesignError
@@ -29,7 +29,7 @@ Points = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def design(**values: str) -> Design:
-    return load_design("honeycomb", {"layers": "6", **values})
+    return load("honeycomb", {"layers": "6", **values})
 
 
 @pytest.fixture(scope="module")
@@ -366,7 +366,7 @@ def test_a_sheet_says_where_it_is_printed_and_is_mirrored_there(
     mirrored: str, film: str, page_mirrored: bool, said: str
 ) -> None:
     def sheet(**values: str) -> str:
-        design = load_design("honeycomb", {"layers": "2", "sheet.pads": "1", **values})
+        design = load("honeycomb", {"layers": "2", "sheet.pads": "1", **values})
         content = make_print_sheet(design, build_layout(design)).files["print/sheet.svg"]
         assert isinstance(content, str)
         return content

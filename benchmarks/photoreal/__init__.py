@@ -1,0 +1,1 @@
+"""``python -m benchmarks.photoreal``: pictures of an independent path tracer, read and compared with their truth."""

@@ -1,0 +1,1 @@
+"""Pictures of an independent path tracer: their files, their reading, their score."""

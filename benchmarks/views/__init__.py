@@ -1,0 +1,1 @@
+"""``python -m benchmarks.views``: views without the white cell, read where one motion fits their cells only."""

@@ -1,0 +1,118 @@
+"""Image files as a source, with times by their names, by their count, or by a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from statistics import median
+
+from cmpdesign.errors import parameter
+from cmpdesign.files.images import ImageFileError, read_image
+from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.frame_names import NS_PER_S, NamedTimes, read_names
+from cmpdesign.inputs.sources import SourceError
+from cmpdesign.tracking.sources.frame_source import SourceFrame, SourceTimes
+from cmpdesign.tracking.sources.time_table import TimeTable
+
+DEFAULT_FPS = 30.0
+_MOST_FPS = 1e5
+
+
+class ImagesSource:
+    """Image files in a given order.
+
+    Args:
+        paths: the files.
+        name: name for messages.
+        fps: rate at which frames, or the numbers in names, are counted; None: 30.
+        most_pixels: limit of width x height.
+        times: "names", "index", a table, or None: what the names say, else the index.
+        left_out: number of files that are no frames.
+
+    Raises:
+        SourceError: times by names that carry none.
+    """
+
+    is_live = False
+
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        name: str,
+        fps: float | None = None,
+        most_pixels: int = MOST_PIXELS,
+        times: str | TimeTable | None = None,
+        left_out: int = 0,
+    ) -> None:
+        self._paths, self._most_pixels = tuple(paths), most_pixels
+        self.name, self.ended_early = name, ""
+        self.total: int | None = len(self._paths)
+        self._times_s, self.times = _times(self._paths, fps or DEFAULT_FPS, fps is not None, times, name)
+        steps_s = [b - a for a, b in zip(self._times_s, self._times_s[1:], strict=False) if b > a]
+        step_s = median(steps_s) if steps_s and self.times.of in ("names", "table") else 0.0
+        self.fps: float | None = 1 / step_s if step_s > 1 / _MOST_FPS else fps or DEFAULT_FPS
+        if left_out:
+            text = f"{self.times.text}; {left_out} files are left out: hidden, empty or cut off"
+            self.times = SourceTimes(**(vars(self.times) | {"text": text}))
+
+    def frames(self) -> Iterator[SourceFrame]:
+        for time_s, path in zip(self._times_s, self._paths, strict=True):
+            try:
+                yield SourceFrame(time_s, read_image(path, self._most_pixels), path=path)
+            except ImageFileError as error:
+                yield SourceFrame(time_s, None, str(error), path)
+
+
+def _times(
+    paths: Sequence[Path], fps: float, is_given: bool, wanted: str | TimeTable | None, name: str
+) -> tuple[list[float], SourceTimes]:
+    if isinstance(wanted, TimeTable):
+        times_s = [wanted.time_s(index, path.name) for index, path in enumerate(paths)]
+        if all(time_s != time_s for time_s in times_s):
+            raise SourceError(
+                f"{wanted.path}: has no time for any picture of {name}, neither by name nor by number"
+            )
+        return times_s, table_times(wanted)
+    named = None if wanted == "index" else read_names(paths)
+    if named is not None and any(a >= b for a, b in zip(named.values, named.values[1:], strict=False)):
+        named = None  # the pictures were given in another order
+    if named is None and wanted == "names":
+        raise SourceError(
+            f"{name}: the names carry no times; expected one number that rises from name to name, as in frame7.png or "
+            f"1700000000.123.png; use {parameter('times', 'index')}, or {parameter('times')} with a file .csv"
+        )
+    rate = f"{fps:g} per second ({parameter('fps') if is_given else 'the default of ' + parameter('fps')})"
+    if named is None:
+        text = f"times: counted at {rate}, by the order of {len(paths)} pictures"
+        return [index / fps for index in range(len(paths))], SourceTimes("index", text)
+    if named.kind == "numbers":
+        first, missing = named.values[0], named.missing
+        gaps = f", {missing} numbers are missing" if missing else ""
+        text = f"times: by the numbers in {len(paths)} names at {rate}{gaps}"
+        origin = ("frame number", first / fps)
+        return [(n - first) / fps for n in named.values], SourceTimes("numbers", text, origin=origin)
+    return _times_of_stamps(named)
+
+
+def _times_of_stamps(named: NamedTimes) -> tuple[list[float], SourceTimes]:
+    first = named.values[0]
+    times_s = [(value - first) / NS_PER_S for value in named.values]
+    if named.kind == "seconds":
+        text = f"times: the seconds in {len(times_s)} names"
+        return times_s, SourceTimes("names", text, origin=("seconds in names", first / NS_PER_S))
+    began_s = first / NS_PER_S
+    text = f"times: the stamps in {len(times_s)} names, since 1970"
+    return times_s, SourceTimes("names", text, began_s, "names", origin=("unix", began_s))
+
+
+def table_times(table: TimeTable) -> SourceTimes:
+    """How times of a table are found."""
+    began_s = table.began_s if table.is_unix else None
+    kind = "unix" if table.is_unix else "table"
+    return SourceTimes(
+        "table",
+        f"times: from {table.path}",
+        began_s,
+        None if began_s is None else "table",
+        origin=(kind, table.began_s),
+    )

@@ -1,0 +1,60 @@
+"""Pads with relief: the height of cells moves markers to the plane of the black; covariances say how well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.layout.layout import AsMade, Layout
+from cmpdesign.scene import Camera, render, standard_layout, standard_scene
+from extractor import Extractor, Markers, Status, parse_layout
+
+CAMERAS = tuple(
+    Camera(28.0, rotation_deg=turn, tilt_deg=tilt, tilt_axis_deg=2 * turn, focal_px=focal)
+    for turn, tilt, focal in (
+        (7.0, 0.0, 450.0),
+        (50.0, 6.0, 600.0),
+        (111.0, 12.0, 500.0),
+        (200.0, 20.0, 550.0),
+    )
+)
+
+
+def made(height_mm: float) -> Layout:
+    layout = standard_layout("honeycomb", 6)
+    return replace(layout, as_made=AsMade(layout.digest, "measured", "front", cell_height_mm=height_mm))
+
+
+def read(layout: Layout, image: np.ndarray) -> Markers:
+    return Extractor(parse_layout(layout_to_json(layout))).extract(image)
+
+
+@pytest.mark.parametrize("height_mm", [-0.15, 0.15])
+def test_the_height_of_cells_brings_markers_to_the_black(height_mm: float) -> None:
+    squares, told, untold = [], [], []
+    for camera in CAMERAS:
+        shot = render(replace(standard_scene(made(height_mm)), camera=camera))
+        with_height, without = (read(made(height), shot.image) for height in (height_mm, 0.0))
+        measured = (with_height.status == Status.MEASURED) & (without.status == Status.MEASURED)
+        assert measured.mean() > 0.95
+        error = (with_height.xy_px - shot.truth.marker_xy_px)[measured]
+        cov = with_height.cov_px2[measured]
+        squares.append(np.einsum("mi,mij,mj->m", error, np.linalg.inv(cov), error))
+        told.append((error**2).sum(axis=1))
+        untold.append(((without.xy_px - shot.truth.marker_xy_px)[measured] ** 2).sum(axis=1))
+        assert not np.array_equal(with_height.virtual_xy_px, without.virtual_xy_px)
+    d2 = np.concatenate(squares)
+    assert 0.4 < np.sqrt(d2.mean() / 2) < 1.3 and (d2 > 11.83).mean() < 0.01
+    assert np.concatenate(told).mean() < 0.5 * np.concatenate(untold).mean()
+
+
+def test_a_flat_pad_is_read_as_before() -> None:
+    """A height of 0 is no height: the same bits as without ``as_made``."""
+    layout = made(0.0)
+    image = render(replace(standard_scene(layout), camera=CAMERAS[1])).image
+    flat, designed = read(layout, image), read(replace(layout, as_made=None), image)
+    for name in ("xy_px", "cov_px2", "status", "virtual_xy_px", "virtual_cov_px2"):
+        np.testing.assert_array_equal(getattr(flat, name), getattr(designed, name))
