@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from cmpdesign.api.sequences import open_source as open_source
     from cmpdesign.api.sequences import reconstruct as reconstruct
     from cmpdesign.api.sequences import track as track
+    from cmpdesign.api.workshop import calibrate_force as calibrate_force
+    from cmpdesign.api.workshop import calibrate_gel as calibrate_gel
     from cmpdesign.api.workshop import calibrate_pattern as calibrate_pattern
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
@@ -79,6 +81,8 @@ _HOMES = {
     "ShapeOptions": "cmpdesign.api.sequences",
     "Verifier": "cmpdesign.api.pictures",
     "build_layout": "cmpdesign.api.layouts",
+    "calibrate_force": "cmpdesign.api.workshop",
+    "calibrate_gel": "cmpdesign.api.workshop",
     "calibrate_pattern": "cmpdesign.api.workshop",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",

@@ -41,11 +41,17 @@ def triangulate_outline(
     # Points are tried from fine to coarse lattices and kept at a distance of about the wanted size.
     levels = fine_mm * 2.0 ** np.arange(0, 8, 0.5)
     low, high = outline_mm.min(axis=0), outline_mm.max(axis=0)
-    for level, next_level in zip(levels, levels[1:], strict=False):
+    for level in levels[:-1]:
         rows = np.arange(low[1], high[1], level * np.sqrt(0.75))
         lattice = np.concatenate(
             [
-                np.stack([np.arange(low[0] + level * (i % 2) / 2, high[0], level), 0 * np.arange(low[0] + level * (i % 2) / 2, high[0], level) + y], 1)
+                np.stack(
+                    [
+                        np.arange(low[0] + level * (i % 2) / 2, high[0], level),
+                        0 * np.arange(low[0] + level * (i % 2) / 2, high[0], level) + y,
+                    ],
+                    1,
+                )
                 for i, y in enumerate(rows)
             ]
         )

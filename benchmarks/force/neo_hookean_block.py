@@ -71,7 +71,9 @@ class NeoHookeanBlock:
         self.scalar = scalar
         pressure = self.basis.with_element(skfem.ElementTetP1())
         self.weights = self.basis.dx  # (T, Q)
-        self.slopes = np.stack([np.broadcast_to(b[0].grad, (3, *self.weights.shape)) for b in scalar.basis])  # (10,3,T,Q)
+        self.slopes = np.stack(
+            [np.broadcast_to(b[0].grad, (3, *self.weights.shape)) for b in scalar.basis]
+        )  # (10,3,T,Q)
         self.shapes = np.stack([np.broadcast_to(b[0], self.weights.shape) for b in pressure.basis])  # (4,T,Q)
         self.nodes, self.pressure_nodes = scalar.element_dofs, pressure.element_dofs  # (10,T), (4,T)
         self.place = np.zeros((scalar.N, 3))
@@ -81,7 +83,9 @@ class NeoHookeanBlock:
         self.face_weights = self.face.dx
         face_values = np.stack([np.broadcast_to(b[0], self.face_weights.shape) for b in self.face.basis])
         self.face_nodes = self.face.element_dofs
-        on = np.abs(face_values).max(axis=(1, 2)) >= 0  # all ten nodes of the tetrahedra; those off the face are zero
+        on = (
+            np.abs(face_values).max(axis=(1, 2)) >= 0
+        )  # all ten nodes of the tetrahedra; those off the face are zero
         self.face_values = face_values[on]
         self.face_place = np.asarray(self.face.global_coordinates())  # (3,F,Q)
         self.free = np.flatnonzero(np.repeat(self.place[:, 2] > -h + 1e-9, 3))
@@ -172,7 +176,7 @@ class NeoHookeanBlock:
         curved = np.zeros((len(x), 3, 3))
         curved[touching] = np.einsum("ij,njk,lk->nil", turn, self.target.turn(local[touching]), turn)
         flat = np.eye(3) - normal[:, :, None] * normal[:, None, :]
-        before_local, before_turn = self._object_frame(x, self.pose)
+        _, before_turn = self._object_frame(x, self.pose)
         # the object's material point at x now was at x - carried before this increment
         centre = np.append(np.mean(self.target.centres_mm, axis=0), 0.0)
         carried = x - ((local - centre) @ before_turn.T + centre + np.array(self.pose[:3]))
@@ -190,7 +194,9 @@ class NeoHookeanBlock:
         stiff = normal[:, :, None] * d_pressure[:, None, :] + pressure[:, None, None] * curved
         along = (normal * pull).sum(axis=1)
         turned = np.einsum("nji,nj->ni", curved, pull)
-        d_trial = -held[:, :, None] * flat - along[:, None, None] * curved - normal[:, :, None] * turned[:, None, :]
+        d_trial = (
+            -held[:, :, None] * flat - along[:, None, None] * curved - normal[:, :, None] * turned[:, None, :]
+        )
         stick = d_trial * (touching & ~slipping)[:, None, None]
         across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
         ratio = np.where(slipping, limit / np.maximum(size, 1e-15), 0.0)
@@ -222,7 +228,9 @@ class NeoHookeanBlock:
         squeeze = -np.einsum("atq,btq->tab", shapes, shapes * (self.bulk_compliance * w), optimize=True)
         return self._solve(inner, swell, matrix, coupling, squeeze, contact)
 
-    def _solve(self, inner: Array, swell: Array, matrix: Array, coupling: Array, squeeze: Array, contact: _Contact) -> tuple[Array, Array]:
+    def _solve(
+        self, inner: Array, swell: Array, matrix: Array, coupling: Array, squeeze: Array, contact: _Contact
+    ) -> tuple[Array, Array]:
         n, m = 3 * self.count, self.pressure_count
         dof = (3 * self.nodes.T[:, :, None] + np.arange(3)).reshape(len(self.nodes.T), -1)
         face_dof = (3 * self.face_nodes.T[:, :, None] + np.arange(3)).reshape(len(self.face_nodes.T), -1)
@@ -264,7 +272,9 @@ class _Pattern:
 
     def __init__(self, rows: Any, columns: Any, size: int) -> None:
         self.used = np.flatnonzero((rows >= 0) & (columns >= 0))
-        key, self.at = np.unique(rows[self.used].astype(np.int64) * size + columns[self.used], return_inverse=True)
+        key, self.at = np.unique(
+            rows[self.used].astype(np.int64) * size + columns[self.used], return_inverse=True
+        )
         self.indices = (key % size).astype(np.int32)
         self.indptr = np.searchsorted(key, size * np.arange(size + 1, dtype=np.int64)).astype(np.int32)
         self.size, self.pardiso = size, None

@@ -42,11 +42,19 @@ class RigidObject:
         return np.stack(columns, axis=2)
 
     def _nearest(self, x: Array) -> Array:
-        centres = np.column_stack([np.asarray(self.centres_mm), np.full(len(self.centres_mm), self.radius_mm)])
+        centres = np.column_stack(
+            [np.asarray(self.centres_mm), np.full(len(self.centres_mm), self.radius_mm)]
+        )
         if self.kind == "points":
             which = np.linalg.norm(x[:, None] - centres[None], axis=2).argmin(axis=1)
             return np.asarray(centres[which])
         off = x[:, :2] - centres[0, :2]
         rho = np.maximum(np.hypot(*off.T), 1e-9)
-        wanted = np.full_like(rho, self.skeleton_mm) if self.kind == "circle" else np.minimum(rho, self.skeleton_mm)
-        return np.column_stack([centres[0, :2] + off * (wanted / rho)[:, None], np.full(len(x), self.radius_mm)])
+        wanted = (
+            np.full_like(rho, self.skeleton_mm)
+            if self.kind == "circle"
+            else np.minimum(rho, self.skeleton_mm)
+        )
+        return np.column_stack(
+            [centres[0, :2] + off * (wanted / rho)[:, None], np.full(len(x), self.radius_mm)]
+        )

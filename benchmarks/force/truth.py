@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from benchmarks.force.neo_hookean_block import NeoHookeanBlock, Pose
 from benchmarks.force.objects import RigidObject
-from cmpdesign import build_layout, load_design
+from cmpdesign import build_layout
+from cmpdesign.design.design import load_design
 
 Array = NDArray[np.float64]
 TRUTH = Path(__file__).parent / "truth.npz"
@@ -54,9 +55,26 @@ def cases() -> tuple[Case, ...]:
         Case("shear", _ball(5), (*_presses(0.35, 0.7), *drag)),
         Case("oblique", _ball(4, 3, -2), tuple(Pose(0.6 * s, 0.3 * s, -s) for s in (0.3, 0.6, 0.9))),
         Case("twist", RigidObject("disk", 0.6, ((-1.0, 1.5),), 2.4), twist),
-        Case("punch", RigidObject("disk", 0.5, ((0.5, 0.3),), 2.0), _presses(0.15, 0.3, 0.5), fine_radius_mm=2.5),
-        Case("ring", RigidObject("circle", 0.75, ((0.0, 0.0),), 3.0), _presses(0.2, 0.4, 0.6), fine_mm=0.9, fine_radius_mm=4.0),
-        Case("two balls", RigidObject("points", 1.5, ((-1.5, 0.4), (1.5, 0.4))), _presses(0.2, 0.5), fine_mm=0.75, fine_radius_mm=1.2),
+        Case(
+            "punch",
+            RigidObject("disk", 0.5, ((0.5, 0.3),), 2.0),
+            _presses(0.15, 0.3, 0.5),
+            fine_radius_mm=2.5,
+        ),
+        Case(
+            "ring",
+            RigidObject("circle", 0.75, ((0.0, 0.0),), 3.0),
+            _presses(0.2, 0.4, 0.6),
+            fine_mm=0.9,
+            fine_radius_mm=4.0,
+        ),
+        Case(
+            "two balls",
+            RigidObject("points", 1.5, ((-1.5, 0.4), (1.5, 0.4))),
+            _presses(0.2, 0.5),
+            fine_mm=0.75,
+            fine_radius_mm=1.2,
+        ),
         Case("rim", _ball(4, 11.0, 0.5), (*_presses(0.3, 0.6), Pose(0.3, 0, -0.6))),
         Case("thin layer", _ball(5, 1, 1), (*_presses(0.25, 0.5), Pose(0.3, 0, -0.5)), thickness_mm=2.0),
         Case("nu .49", _ball(5), (*_presses(0.4, 0.8), Pose(0.3, 0, -0.8)), poisson=0.49),
@@ -65,21 +83,40 @@ def cases() -> tuple[Case, ...]:
 
 def solve_case(case: Case, outline_mm: Array, markers_mm: Array) -> Iterator[dict[str, Array]]:
     """Every frame of a contact as the fields of the file."""
-    block = NeoHookeanBlock(outline_mm, case.thickness_mm, YOUNG_MPA, case.poisson, case.target, FRICTION, case.fine_mm, case.fine_radius_mm)
+    block = NeoHookeanBlock(
+        outline_mm,
+        case.thickness_mm,
+        YOUNG_MPA,
+        case.poisson,
+        case.target,
+        FRICTION,
+        case.fine_mm,
+        case.fine_radius_mm,
+    )
     for pose in case.poses:
         wrench = block.move(pose)
         at, traction, area = block.pressure_map()
         pressure = block.last.pressure
         touched = pressure > TOUCHED * pressure.max()
-        sides = [touched & side for side in ((at[:, 0] < 0, at[:, 0] >= 0) if len(case.target.centres_mm) == 2 else (touched,))]
+        sides = [
+            touched & side
+            for side in ((at[:, 0] < 0, at[:, 0] >= 0) if len(case.target.centres_mm) == 2 else (touched,))
+        ]
         yield {
-            "displacement_mm": np.stack([block.displacement(markers_mm, d) for d in DEPTHS_MM]).astype(np.float32),
+            "displacement_mm": np.stack([block.displacement(markers_mm, d) for d in DEPTHS_MM]).astype(
+                np.float32
+            ),
             "force_n": wrench.force_n,
             "torque_nmm": wrench.torque_nmm,
             "rest_torque_nmm": np.cross(at, traction * area[:, None]).sum(axis=0),
             "pose": np.array(pose),
             "area_mm2": np.array([area[s].sum() for s in sides + sides[:1]][:2]),
-            "centre_mm": np.stack([(at[s, :2] * (pressure * area)[s, None]).sum(0) / (pressure * area)[s].sum() for s in sides + sides[:1]][:2]),
+            "centre_mm": np.stack(
+                [
+                    (at[s, :2] * (pressure * area)[s, None]).sum(0) / (pressure * area)[s].sum()
+                    for s in sides + sides[:1]
+                ][:2]
+            ),
             "utilisation": np.array(np.hypot(*wrench.force_n[:2]) / (FRICTION * -wrench.force_n[2])),
             "largest_pressure_mpa": np.array(pressure.max()),
         }
@@ -97,7 +134,13 @@ def main() -> int:
         if case.name not in args.only:
             continue
         for frame in solve_case(case, layout.outline_mm, layout.marker_xy_mm):
-            print(case.name, frame["pose"].round(2), frame["force_n"].round(3), frame["torque_nmm"].round(2), flush=True)
+            print(
+                case.name,
+                frame["pose"].round(2),
+                frame["force_n"].round(3),
+                frame["torque_nmm"].round(2),
+                flush=True,
+            )
             rows.append(frame)
             names.append(case.name)
             columns = {key: np.stack([row[key] for row in rows]) for key in frame}

@@ -362,11 +362,15 @@ class ReconstructJob:
             model_px=shape.model_px,
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
+        contact = None if shape.contact is None else _contact_reader(shape.contact, self.rig, views.layout)
         source = open_sources(self.source, how.fps, how.max_pixels, how.times)
         is_one_a_view = len(split_list(self.source)) > 1
         recording = replace(how.recording, views=rig.views, is_image_one_a_view=is_one_a_view)
         outputs = open_outputs(
-            self.output, ShapeTable(reconstructor, continuation, lambda: source.times), recording, how.viewer
+            self.output,
+            ShapeTable(reconstructor, continuation, lambda: source.times, contact),
+            recording,
+            how.viewer,
         )
         tracker = ShapeTracker(
             reconstructor,
@@ -468,6 +472,14 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 
     edges_mm = np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0]
     return SurfaceContinuation(elastomer, layout.xy_mm, float(np.median(np.hypot(*edges_mm.T))))
+
+
+def _contact_reader(gel: Path, rig: Path, layout: Reference) -> ContactReader:
+    from cmpdesign.tracking.marker_depth import read_young_mpa
+    from extractor.contact import ContactReader, load_gel
+
+    young_mpa, sigma_mpa = read_young_mpa(rig)
+    return ContactReader(layout, load_gel(gel), young_mpa, young_sigma_mpa=sigma_mpa)
 
 
 def _require_positive(name: str, value: float | None) -> None:

@@ -72,3 +72,10 @@ def long_head_columns(columns: Columns, count: int) -> Columns:
     long["frame_status"] = np.repeat(np.array(FRAME_STATUS)[columns["frame_status"]], count)
     long["reason"] = np.repeat(columns["reason"], count)
     return long
+
+
+def by_point(of_markers: NDArray[Any], count: int) -> NDArray[Any]:
+    """(F * count,) from (F, M): NaN for the virtual markers."""
+    padded = np.full((len(of_markers), count), np.nan, of_markers.dtype)
+    padded[:, : of_markers.shape[1]] = of_markers
+    return padded.reshape(-1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from cmpdesign.errors import CmpDesignError, parameter
 
@@ -16,6 +17,8 @@ class ShapeOptions:
         flatness_mm: standard deviation of the markers from the plane at rest.
         model_px: error of the camera model; None: from the rest frame.
         surface: also give the touched surface, by the [elastomer] of the rig.
+        contact: file of the pad's gel (``calibrate gel``); also give force, torque and traction, by the Young's modulus
+            of the rig's [elastomer]; None: not wanted.
 
     Raises:
         CmpDesignError: a length that is negative or not finite.
@@ -25,6 +28,7 @@ class ShapeOptions:
     flatness_mm: float = 0.0
     model_px: float | None = None
     surface: bool = False
+    contact: Path | None = None
 
     def __post_init__(self) -> None:
         for name in ("flatness_mm", "model_px"):

@@ -7,5 +7,7 @@ regions, each with its deviation, or a reason.
 from __future__ import annotations
 
 from extractor.contact.gel import Gel, load_gel
+from extractor.contact.reader import ContactReader, ForceModel
+from extractor.contact.result import ContactForce, ContactReason, Region
 
-__all__ = ["Gel", "load_gel"]
+__all__ = ["ContactForce", "ContactReader", "ContactReason", "ForceModel", "Gel", "Region", "load_gel"]

@@ -1,10 +1,10 @@
 """Tractions under which the markers move as measured: pressure is never negative, shear acts only where it presses.
 
-Minimised is (d - A t)' W (d - A t) + |t|^2 / tau^2, with W the inverse covariance of the displacements d. The support, the
-set of loads that press, is an active set (Lawson and Hanson 1974): loads whose pressure would be negative leave it, loads
-at which the residual asks for pressure join it. The gain of a load is the decrease of the sum's root by this load
-alone. It is compared with chi, the root mean square of the whitened residual, so that the model's own error does not
-add stray loads.
+Minimised is (d - A t)' W (d - A t) + |t|^2 / tau^2, with W the inverse covariance of the displacements d. The support,
+the set of loads that press, is an active set (Lawson and Hanson 1974): loads whose pressure would be negative leave
+it, loads at which the residual asks for pressure join it. The gain of a load is the decrease of the sum's root by this
+load alone. It is compared with chi, the root mean square of the whitened residual, so that the model's own error does
+not add stray loads.
 """
 
 from __future__ import annotations
@@ -151,7 +151,12 @@ class TractionSolver:
 
     def _settle(self, white: Array, whitening: Array, support: Ids) -> tuple[Ids, Array, Array, Array]:
         """The support without loads that would pull, their tractions, covariance, and the whitened residual."""
-        blocks = np.einsum("mij,smaj->mias", whitening, self._by_load[support].reshape(len(support), 3, -1, 3).transpose(0, 2, 1, 3), optimize=True)
+        blocks = np.einsum(
+            "mij,smaj->mias",
+            whitening,
+            self._by_load[support].reshape(len(support), 3, -1, 3).transpose(0, 2, 1, 3),
+            optimize=True,
+        )
         columns = blocks.reshape(white.size, 3, len(support)).transpose(0, 2, 1).reshape(white.size, -1)
         gram = columns.T @ columns
         gram[np.diag_indices_from(gram)] += self._limits.tau**-2

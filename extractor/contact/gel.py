@@ -1,6 +1,6 @@
 """Green's matrix of a pad: displacement of its markers by loads on the touched face, and its file.
 
-``cmpdesign`` makes the file once for a pad and its elastomer (``python -c``, ``cmpdesign calibrate gel``); numpy reads it.
+``cmpdesign calibrate gel`` makes the file once for a pad and its elastomer; numpy reads it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import zipfile
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from extractor.layout.text_file import printable_path
 
 Array = NDArray[np.float64]
 FORMAT = "cmp-gel 1"
-HOW = "make the file with: cmpdesign calibrate gel LAYOUT --elastomer ELASTOMER"
+HOW = "make the file with: cmpdesign calibrate gel LAYOUT RIG -o FILE"
 MAX_BYTES = 1 << 29
 
 
@@ -65,11 +65,10 @@ class Gel:
         )
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def write(self, path: str | PathLike[str]) -> None:
-        """Write the file; the same gel gives the same bytes."""
+    def write(self, file: str | PathLike[str] | IO[bytes]) -> None:
+        """Write the file, by its path or into a stream; the same gel gives the same bytes."""
         columns: dict[str, Any] = {part.name: getattr(self, part.name) for part in fields(self)}
-        with Path(path).open("wb") as file:
-            np.savez(file, format=np.array(FORMAT), digest=np.array(self.digest), **columns)
+        np.savez(file, format=np.array(FORMAT), digest=np.array(self.digest), **columns)
 
     def require_layout(self, layout: Reference) -> None:
         """Check that the gel is that of a layout.
@@ -79,7 +78,8 @@ class Gel:
         """
         if layout.digest != self.layout_digest:
             raise GelError(
-                f"the gel was made for the layout {self.layout_digest[:12]}, the layout here is {layout.digest[:12]}; {HOW}"
+                f"the gel was made for the layout {self.layout_digest[:12]}, the layout here is "
+                f"{layout.digest[:12]}; {HOW}"
             )
 
 
@@ -93,7 +93,7 @@ def load_gel(path: str | PathLike[str]) -> Gel:
     try:
         if Path(path).stat().st_size > MAX_BYTES:
             raise GelError(f"{name}: larger than {MAX_BYTES >> 20} MiB; {HOW}")
-        with np.load(path, allow_pickle=False) as file:
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             if str(file["format"]) != FORMAT:
                 raise GelError(f"{name}: format {str(file['format'])[:40]!r}, expected {FORMAT!r}; {HOW}")
             values = {part.name: file[part.name] for part in fields(Gel)}

@@ -83,7 +83,9 @@ class ContactReader:
         self.layout = layout_of(layout)
         gel.require_layout(self.layout)
         if young_mpa is None or not np.isfinite(young_mpa) or young_mpa <= 0:
-            raise GelError(f"young_mpa is {young_mpa}; forces need Young's modulus above 0 MPa: cmpdesign calibrate force")
+            raise GelError(
+                f"young_mpa is {young_mpa}; forces need Young's modulus above 0 MPa: cmpdesign calibrate force"
+            )
         self.gel, self.young_mpa, self.friction, self.model = gel, float(young_mpa), friction, model
         self.young_share = float(young_sigma_mpa) / self.young_mpa
         self.about_mm = np.asarray(about_mm, np.float64)
@@ -127,10 +129,16 @@ class ContactReader:
         try:
             whitening[known] = np.linalg.inv(np.linalg.cholesky(np.asarray(cov_mm2)[known]))
         except np.linalg.LinAlgError:
-            raise ValueError("cov_mm2 has a matrix that is not positive definite; give the noise's covariance") from None
-        solution = self._solver.solve(np.where(known[:, None], displacement_mm, 0.0), whitening, self._support)
+            raise ValueError(
+                "cov_mm2 has a matrix that is not positive definite; give the noise's covariance"
+            ) from None
+        solution = self._solver.solve(
+            np.where(known[:, None], displacement_mm, 0.0), whitening, self._support
+        )
         self._support = None if solution is None else solution.support
-        return self._without(ContactReason.NOTHING_TOUCHED, 0.0) if solution is None else self._answer(solution)
+        return (
+            self._without(ContactReason.NOTHING_TOUCHED, 0.0) if solution is None else self._answer(solution)
+        )
 
     def _without(self, reason: ContactReason, value: float) -> ContactForce:
         none = np.full((3, 3), np.nan)
@@ -170,7 +178,9 @@ class ContactReader:
             misfit=solution.chi,
         )
 
-    def _summed(self, members: NDArray[np.intp], support: NDArray[np.intp], force: Array, noise: Array) -> _Sum:
+    def _summed(
+        self, members: NDArray[np.intp], support: NDArray[np.intp], force: Array, noise: Array
+    ) -> _Sum:
         area = self.gel.area_mm2[support[members]]
         arm = np.column_stack([self.gel.loads_mm[support[members]], np.zeros(len(members))]) - self.about_mm
         part = force[members]
@@ -187,10 +197,19 @@ class ContactReader:
         share = np.hypot(*total[:2]) ** 2 + 0.1 * total[2] ** 2
         own = own * np.array([share, share, total[2] ** 2])
         own = own + self.young_share**2 * np.outer(total, total)
-        spread = float(np.sqrt((np.abs(part[:, 2]) @ (arm[:, :2] ** 2).sum(axis=1)) / max(np.abs(part[:, 2]).sum(), 1e-12)))
-        size = model.torque_error**2 * (torque**2).max() + (0.3 * model.shear_error * spread * np.linalg.norm(total)) ** 2
+        spread = float(
+            np.sqrt(
+                (np.abs(part[:, 2]) @ (arm[:, :2] ** 2).sum(axis=1)) / max(np.abs(part[:, 2]).sum(), 1e-12)
+            )
+        )
+        size = (
+            model.torque_error**2 * (torque**2).max()
+            + (0.3 * model.shear_error * spread * np.linalg.norm(total)) ** 2
+        )
         own_torque = np.eye(3) * size + self.young_share**2 * np.outer(torque, torque)
-        return _Sum(total, to_force @ cov @ to_force.T + own, torque, to_torque @ cov @ to_torque.T + own_torque)
+        return _Sum(
+            total, to_force @ cov @ to_force.T + own, torque, to_torque @ cov @ to_torque.T + own_torque
+        )
 
     def _region(self, patch: Patch, support: NDArray[np.intp], force: Array, noise: Array) -> Region:
         whole = self._summed(patch.members, support, force, noise)
@@ -200,7 +219,9 @@ class ContactReader:
         rows = 3 * patch.members + 2
         by_load = (at - centre) * (self.gel.area_mm2[support[patch.members]] / press.sum())[:, None]
         cov = by_load.T @ noise[np.ix_(rows, rows)] @ by_load + self.model.centre_error_mm**2 * np.eye(2)
-        return Region(patch.area_mm2, patch.outline_mm, centre, cov, whole.force, whole.force_cov, whole.torque)
+        return Region(
+            patch.area_mm2, patch.outline_mm, centre, cov, whole.force, whole.force_cov, whole.torque
+        )
 
     def _reason(self, whole: _Sum, patches: list[Patch], support: NDArray[np.intp]) -> ContactReason:
         if -whole.force[2] < LEAST_SIGMAS * np.sqrt(whole.force_cov[2, 2]):

@@ -12,8 +12,12 @@ from extractor.contact.gel import Gel
 
 Array = NDArray[np.float64]
 FINE = 4  # cells of the picture of the pressure per spacing of the loads; chosen
-TOUCHED_SHARE = 0.25  # of a region's largest pressure, above which a place is touched; measured: benchmarks.force
-SADDLE_SHARE = 0.6  # of the smaller of two peaks, below which the pressure between them separates regions; chosen
+TOUCHED_SHARE = (
+    0.25  # of a region's largest pressure, above which a place is touched; measured: benchmarks.force
+)
+SADDLE_SHARE = (
+    0.6  # of the smaller of two peaks, below which the pressure between them separates regions; chosen
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +54,19 @@ def find_patches(gel: Gel, pressure_mpa: Array, support: NDArray[np.intp]) -> li
         outlines, _ = cv2.findContours(touched, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         outline = max(outlines, key=cv2.contourArea)[:, 0].astype(np.float64)
         outline = ((outline + 0.5) / FINE - 0.5 - 1.0) * step + low
-        found.append(Patch(members, max(float(touched.sum()), 1.0) * (step / FINE) ** 2, _counter_clockwise(outline)))
+        found.append(
+            Patch(members, max(float(touched.sum()), 1.0) * (step / FINE) ** 2, _counter_clockwise(outline))
+        )
     return found
 
 
 def _labels(field: Array) -> NDArray[np.intp]:
-    """(ny, nx) label of every cell: cells climb to the peak of their neighbourhood; near peaks with a high saddle join."""
+    """(ny, nx) label of every cell: cells climb to their neighbourhood's peak; peaks with a high saddle join."""
     ny, nx = field.shape
     padded = np.pad(field, 1, constant_values=-np.inf)
-    around = np.stack([padded[1 + i : 1 + i + ny, 1 + j : 1 + j + nx] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    around = np.stack(
+        [padded[1 + i : 1 + i + ny, 1 + j : 1 + j + nx] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    )
     step = around.argmax(axis=0)
     step[field >= around.max(axis=0)] = 4
     rows, columns = np.indices(field.shape)
@@ -74,7 +82,12 @@ def _labels(field: Array) -> NDArray[np.intp]:
             k = int(parent[k])
         return k
 
-    for a, b in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:]), (np.s_[:-1, :-1], np.s_[1:, 1:]), (np.s_[1:, :-1], np.s_[:-1, 1:])):
+    for a, b in (
+        (np.s_[:, :-1], np.s_[:, 1:]),
+        (np.s_[:-1], np.s_[1:]),
+        (np.s_[:-1, :-1], np.s_[1:, 1:]),
+        (np.s_[1:, :-1], np.s_[:-1, 1:]),
+    ):
         grid = goal.reshape(ny, nx)
         one, two, saddle = grid[a].ravel(), grid[b].ravel(), np.minimum(field[a], field[b]).ravel()
         apart = one != two

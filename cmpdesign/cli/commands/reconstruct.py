@@ -81,6 +81,14 @@ def reconstruct(
             help="Also write the touched surface, computed with the [elastomer] of RIG, in separate columns.",
         ),
     ] = False,
+    contact: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="GEL",
+            help="Also write force, torque and traction; GEL is the file of `calibrate gel`, the modulus is that "
+            "of RIG's [elastomer].",
+        ),
+    ] = None,
     fps: Annotated[
         float | None, typer.Option(help="Frames per second. [default: a video's own; 30 for a folder]")
     ] = None,
@@ -124,7 +132,7 @@ def reconstruct(
     known = parse_reading_response(response)
     shown = (with_images, live, live_port, live_wait_s, times)
     reading = Reading(fps, frames, cold, preset, known, side, channels, max_pixels, frame_id, *shown)
-    shape = ShapeOptions(from_rest, flatness_mm, model_px, surface)
+    shape = ShapeOptions(from_rest, flatness_mm, model_px, surface, contact)
     job = ReconstructJob(load_layout(layout), rig, rest, source, output, reading, shape)
     run = job.prepare()
     print_step(f"{run.source.name} is open, the views are placed")

@@ -28,6 +28,8 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "dataset": (data.DatasetDocument,),
     "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument,),
+    "calibrate force": (reading.CalibrateForceDocument,),
+    "calibrate gel": (reading.CalibrateGelDocument,),
     "calibrate pattern": (reading.CalibratePatternDocument,),
     "export lerobot": (runs.ExportDocument,),
     "export zarr": (runs.ExportDocument,),

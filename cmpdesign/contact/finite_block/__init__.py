@@ -1,4 +1,10 @@
 """The elastic block of finite size: its outline has free walls, its support is rigid.
 
-In: an outline, an elastomer, loads on the touched face, points below it. Out: the displacements that the walls change.
+In: a layout, an elastomer. Out: Green's matrix of the markers, for ``extractor.contact``.
 """
+
+from __future__ import annotations
+
+from cmpdesign.contact.finite_block.green_matrix import make_gel
+
+__all__ = ["make_gel"]

@@ -69,7 +69,10 @@ def _widened(outline_mm: Array, margin_mm: float) -> Array:
 def _loads(outline_mm: Array, spacing_mm: float) -> tuple[Array, Array]:
     """Centres (K, 2) of a square grid inside the outline, and the integral (K,) mm^2 of each load inside it."""
     low, high = outline_mm.min(axis=0), outline_mm.max(axis=0)
-    axes = [spacing_mm * np.arange(np.ceil(a / spacing_mm), np.floor(b / spacing_mm) + 1) for a, b in zip(low, high, strict=True)]
+    axes = [
+        spacing_mm * np.arange(np.ceil(a / spacing_mm), np.floor(b / spacing_mm) + 1)
+        for a, b in zip(low, high, strict=True)
+    ]
     grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     loads = grid[inside_outline(outline_mm, grid) > 0]
     width = LOAD_WIDTH * spacing_mm

@@ -19,7 +19,11 @@ from cmpdesign.contact.finite_block.splines import SUPPORT, SplineAxis, Thicknes
 
 Array = NDArray[np.float64]
 ERSATZ = 1e-4
-AXES = ("x0", "y0", "0z")  # of a derivative by x, y, z: the part along the face, the part through the thickness
+AXES = (
+    "x0",
+    "y0",
+    "0z",
+)  # of a derivative by x, y, z: the part along the face, the part through the thickness
 
 
 def _elastic(product: Callable[[str, str], object], shear: float, lame: float) -> list[list[object]]:
@@ -27,7 +31,9 @@ def _elastic(product: Callable[[str, str], object], shear: float, lame: float) -
     plain = sum((product(AXES[p], AXES[p]) for p in range(3)), start=0.0)  # type: ignore[call-overload]
     return [
         [
-            lame * product(AXES[i], AXES[j]) + shear * product(AXES[j], AXES[i]) + (shear * plain if i == j else 0)  # type: ignore[operator]
+            lame * product(AXES[i], AXES[j])
+            + shear * product(AXES[j], AXES[i])
+            + (shear * plain if i == j else 0)  # type: ignore[operator]
             for j in range(3)
         ]
         for i in range(3)
@@ -66,7 +72,9 @@ def block_stiffness(
     return total.tocsr()
 
 
-def wave_stiffness(count: tuple[int, int], step_mm: float, z: ThicknessBasis, elastic: tuple[float, float]) -> Array:
+def wave_stiffness(
+    count: tuple[int, int], step_mm: float, z: ThicknessBasis, elastic: tuple[float, float]
+) -> Array:
     """The stiffness of the periodic layer at every wave of a grid of (ny, nx) columns, (ny, nx, n, n) complex.
 
     n = 3 polynomials, ordered by polynomial and direction.
@@ -83,7 +91,7 @@ def wave_stiffness(count: tuple[int, int], step_mm: float, z: ThicknessBasis, el
             row = (weight.ravel() * parts[a][:, middle]) @ parts[b]
             for side, n in enumerate(count):
                 turn = np.exp(-2j * np.pi * np.outer(np.fft.fftfreq(n), np.arange(len(row)) - middle))
-                symbols.setdefault(a + b, [np.empty(0)] * 2)[side] = (turn.conj() @ row)
+                symbols.setdefault(a + b, [np.empty(0)] * 2)[side] = turn.conj() @ row
     through = z.products()
 
     def column(test: str, trial: str) -> Array:

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.finite_block.dissection import dissection_order
-from cmpdesign.contact.finite_block.splines import SUPPORT, SplineAxis, ThicknessBasis, axis_over
+from cmpdesign.contact.finite_block.splines import SUPPORT, ThicknessBasis, axis_over
 from cmpdesign.contact.finite_block.stiffness import block_stiffness, wave_stiffness
 
 Array = NDArray[np.float64]
@@ -58,7 +58,7 @@ class WallResponse:
     def matrix(self, centres_mm: Array, width_mm: float) -> Array:
         """(3 M, 3 K) mm/MPa by loads exp(-r^2 / 2 width^2) at centres (K, 2); the block's ends at the outline."""
         everywhere, within = self._loads(centres_mm, width_mm)
-        points, columns = self._seen.shape
+        points = len(self._seen)
         change = np.empty((points, 3, len(centres_mm), 3))
         for j in range(3):
             for i in range(3):
@@ -72,7 +72,9 @@ class WallResponse:
         nx, ny = self._x.at(x)[0], self._y.at(y)[0]
         parts: tuple[list[Array], list[Array]] = ([], [])
         for centre in centres_mm:
-            load = np.outer(*(np.exp(-0.5 * ((at - c) / width_mm) ** 2) for at, c in ((y, centre[1]), (x, centre[0]))))
+            load = np.outer(
+                *(np.exp(-0.5 * ((at - c) / width_mm) ** 2) for at, c in ((y, centre[1]), (x, centre[0])))
+            )
             for kept, weight in zip(parts, (self._weight, self._weight * self._inside), strict=True):
                 kept.append(sp.csr_matrix((ny.T @ (weight * load) @ nx).reshape(1, -1)))
         everywhere, within = (sp.vstack(kept).T.tocsc() for kept in parts)
@@ -89,7 +91,10 @@ class WallResponse:
         used = used[dissection_order(places, SUPPORT - 1)]
         unknowns = (3 * z.count * used[:, None] + np.arange(3 * z.count)).ravel()
         factors = splu(
-            stiffness[unknowns][:, unknowns].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            stiffness[unknowns][:, unknowns].tocsc(),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
         )
         answer = np.zeros((points, 3, columns, 3))
         for start in range(0, points, CHUNK // 3):
@@ -105,7 +110,9 @@ class WallResponse:
         overlap = self._y.at(y)[0].T @ (self._weight * self._inside) @ self._x.at(x)[0]
         return np.asarray(overlap.ravel() > 0)
 
-    def _solve_layer(self, z: ThicknessBasis, elastic: tuple[float, float], through: Array, reach_mm: float) -> Array:
+    def _solve_layer(
+        self, z: ThicknessBasis, elastic: tuple[float, float], through: Array, reach_mm: float
+    ) -> Array:
         """As ``_solve_block``, of the layer without end."""
         points = len(self._seen)
         rows, columns = self._y.count, self._x.count

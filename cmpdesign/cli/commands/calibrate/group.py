@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from cmpdesign.cli.command import Command, Group, examples
-from cmpdesign.cli.commands.calibrate import pattern
+from cmpdesign.cli.commands.calibrate import force, gel, pattern
 
 app = typer.Typer(
     cls=Group,
@@ -18,7 +18,9 @@ app = typer.Typer(
 
 @app.callback()
 def group() -> None:
-    """Keep the command's name although the group has one command."""
+    """Measure one sensor."""
 
 
+app.command("force", cls=Command, epilog=examples(*force.EXAMPLES))(force.force)
+app.command("gel", cls=Command, epilog=examples(*gel.EXAMPLES))(gel.gel)
 app.command("pattern", cls=Command, epilog=examples(*pattern.EXAMPLES))(pattern.pattern)
