@@ -17,6 +17,7 @@ The rooms (folders and modules) in their order; a room imports only rooms before
 - ``pipeline``: the stages in their order, from an image to markers. ``draw`` shows their results.
 - ``made``: places of the markers on one pad, learnt from pictures at rest.
 - ``track``: sequences of images. ``space``: surfaces from two or more views.
+- ``contact``: force, torque and regions from displacement.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ shares no code and no mesh with the Green's matrix that is evaluated.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -128,7 +129,16 @@ class NeoHookeanBlock:
     def displacement(self, xy_mm: Array, depth_mm: float) -> Array:
         """(M, 3) mm of points at a depth."""
         at = np.column_stack([xy_mm, np.full(len(xy_mm), -max(depth_mm, 1e-7))]).T
-        return np.asarray(self.scalar.probes(at) @ self.u)
+        return np.asarray(self.scalar.probes(at) @ self.u).reshape(-1, 3)
+
+    def linear_displacement(self, traction: Callable[[Array], Array], xy_mm: Array, depth_mm: float) -> Array:
+        """(M, 3) mm of points at a depth, by linear theory, for tractions (N, 3) MPa at places (N, 3) of the face."""
+        values = traction(self._face_points())
+        none = np.zeros((len(values), 3, 3))
+        rest = np.zeros_like(self.u)
+        moved, _ = self._newton(rest, 0 * self.p, _Contact(values, 0 * values, none, 0 * values[:, 0]))
+        at = np.column_stack([xy_mm, np.full(len(xy_mm), -max(depth_mm, 1e-7))]).T
+        return np.asarray(self.scalar.probes(at) @ moved).reshape(-1, 3)
 
     def _face_points(self) -> Array:
         return np.asarray(np.moveaxis(self.face_place, 0, -1).reshape(-1, 3))

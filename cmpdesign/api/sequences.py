@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.sources import FrameSource
     from extractor import LayoutLike, Reference
+    from extractor.contact import ContactReader
     from extractor.image.input import Channels
     from extractor.image.response import Response
     from extractor.pipeline import Side

@@ -175,9 +175,12 @@ def calibrate_force(run: str | Path, weights: str | Path) -> ForceScale:
     from cmpdesign.inputs.files import read_text
     from extractor.contact import ContactReason
 
-    arrays = load_run(run).arrays
-    if "force_n" not in arrays:
-        raise CmpDesignError(f"{run} holds no forces; write it with reconstruct --contact")
+    load_run(run)
+    with np.load(run, allow_pickle=False) as file:
+        if "force_n" not in file.files:
+            raise CmpDesignError(f"{run} holds no forces; write it with reconstruct --contact")
+        names = ("frame", "contact_reason", "force_n", "force_cov_n2", "young_mpa")
+        arrays = {name: file[name] for name in names}
     known = parse_weights(read_text(Path(weights)), str(weights))
     missing = np.setdiff1d(known.frame, arrays["frame"])
     if len(missing):

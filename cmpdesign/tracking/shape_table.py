@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmpdesign.tracking.columns import (
+    COVARIANCE,
+    FORCE_DIGITS,
+    UPPER,
     Columns,
     by_point,
+    force_columns,
+    force_long_form,
     head_columns,
     long_head_columns,
     time_columns,
     unknown_times,
 )
-from cmpdesign.tracking.force_columns import FORCE_DIGITS, force_columns, force_long_form
 from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 if TYPE_CHECKING:
@@ -30,8 +34,6 @@ TRIPLES = {
     "3D_Normals": ("nx", "ny", "nz"),
 }
 SURFACE = ("surface_dx_mm", "surface_dy_mm", "surface_dz_mm")  # of the touched surface above the markers
-COVARIANCE = ("xx", "xy", "xz", "yy", "yz", "zz")
-UPPER = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)
 
 
 class ShapeTable:
