@@ -1,6 +1,6 @@
 """Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
 
-Every command is also one call by the same name:
+Every command has its call:
 
     design = cmpdesign.load("tac3d", layers=8)      a design; design.layout, design.check(), design.write("out")
     cmpdesign.size((1280, 960), (24, 18))           a design for a camera and its field of view
@@ -8,7 +8,7 @@ Every command is also one call by the same name:
     cmpdesign.verify("layout.json", "photo.png")    a verdict on a picture; extractor.Extractor reads without a verdict
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
-    cmpdesign.kerf, calibrate_pattern, run_experiment, export_lerobot, export_zarr
+    cmpdesign.kerf, calibrate_camera, calibrate_pattern, run_experiment, export_lerobot, export_zarr
 
 The rooms of the package, each of which imports only rooms above it, left column first:
 
@@ -29,12 +29,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cmpdesign.api.calibration import calibrate_camera as calibrate_camera
     from cmpdesign.api.datasets import dataset as dataset
     from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
     from cmpdesign.api.designs import load as load
     from cmpdesign.api.designs import schema as schema
     from cmpdesign.api.designs import templates as templates
+    from cmpdesign.api.force import calibrate_force as calibrate_force
+    from cmpdesign.api.force import calibrate_gel as calibrate_gel
     from cmpdesign.api.layouts import Layout as Layout
     from cmpdesign.api.layouts import build_layout as build_layout
     from cmpdesign.api.layouts import read_layout as read_layout
@@ -47,13 +50,11 @@ if TYPE_CHECKING:
     from cmpdesign.api.plots import plot_history as plot_history
     from cmpdesign.api.plots import plot_layout as plot_layout
     from cmpdesign.api.plots import plot_markers as plot_markers
-    from cmpdesign.api.sequences import ShapeOptions as ShapeOptions
     from cmpdesign.api.sequences import load_run as load_run
     from cmpdesign.api.sequences import open_source as open_source
     from cmpdesign.api.sequences import reconstruct as reconstruct
+    from cmpdesign.api.sequences import recover_run as recover_run
     from cmpdesign.api.sequences import track as track
-    from cmpdesign.api.workshop import calibrate_force as calibrate_force
-    from cmpdesign.api.workshop import calibrate_gel as calibrate_gel
     from cmpdesign.api.workshop import calibrate_pattern as calibrate_pattern
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
@@ -68,6 +69,9 @@ if TYPE_CHECKING:
     from cmpdesign.layout.checks import check_design as check_design
     from cmpdesign.products.drawing.svg import write_svg as write_svg
     from cmpdesign.proposal.camera_design import size as size
+    from cmpdesign.tracking.jobs.options import SequenceOptions as SequenceOptions
+    from cmpdesign.tracking.jobs.options import ShapeOptions as ShapeOptions
+    from cmpdesign.tracking.jobs.options import TrackOptions as TrackOptions
 
 __version__ = "0.1.0"
 
@@ -78,11 +82,14 @@ _HOMES = {
     "InputError": "cmpdesign.errors",
     "Layout": "cmpdesign.api.layouts",
     "OutputError": "cmpdesign.errors",
-    "ShapeOptions": "cmpdesign.api.sequences",
+    "SequenceOptions": "cmpdesign.tracking.jobs.options",
+    "ShapeOptions": "cmpdesign.tracking.jobs.options",
+    "TrackOptions": "cmpdesign.tracking.jobs.options",
     "Verifier": "cmpdesign.api.pictures",
     "build_layout": "cmpdesign.api.layouts",
-    "calibrate_force": "cmpdesign.api.workshop",
-    "calibrate_gel": "cmpdesign.api.workshop",
+    "calibrate_camera": "cmpdesign.api.calibration",
+    "calibrate_force": "cmpdesign.api.force",
+    "calibrate_gel": "cmpdesign.api.force",
     "calibrate_pattern": "cmpdesign.api.workshop",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",
@@ -101,6 +108,7 @@ _HOMES = {
     "plot_markers": "cmpdesign.api.plots",
     "read_layout": "cmpdesign.api.layouts",
     "reconstruct": "cmpdesign.api.sequences",
+    "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
     "render_sequence": "cmpdesign.api.pictures",
     "run_experiment": "cmpdesign.api.workshop",

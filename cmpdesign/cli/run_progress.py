@@ -2,21 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
+
+import typer
 
 from cmpdesign.cli.progress import progress_bar
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say, say_text
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.cli.terminal import (
+    EXIT_INTERRUPTED,
+    finish,
+    print_step,
+    print_warning,
+    printable_path,
+    say,
+    say_text,
+)
+from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
+    from cmpdesign.documents.runs import FramesPart, ReconstructDocument, TrackDocument
+    from cmpdesign.tracking.jobs.job import Job
     from cmpdesign.tracking.live.view import LiveCount
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.sources import FrameSource
 
+    Summary = TypeVar("Summary", TrackDocument, ReconstructDocument)
+
+RecoverOption = Annotated[
+    bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
+]
 EXIT_NOT_TRACKED = 1
+
+
+def run_and_report(job: Job[Summary], doing: str, show: Callable[[Summary], None]) -> None:
+    """Follow a source with a progress bar, print the summary and the written files, and end the command.
+
+    Args:
+        job: the work.
+        doing: text of the progress bar.
+        show: prints the summary for people.
+
+    Raises:
+        CmpDesignError: an input that cannot be used, or no frame could be read.
+        OutputError: a file could not be written; the summary covers the frames so far.
+    """
+    from cmpdesign.tracking.jobs.job import write_summary
+
+    run = job.prepare()
+    print_step(f"{run.source.name} is open")
+    for warning in run.warnings:
+        print_warning(warning)
+    try:
+        run_with_progress(run, doing)
+    except OutputError:
+        with suppress(OutputError, CmpDesignError):
+            done = write_summary(run, job)
+            show(done)
+            _print_written(done.written[1:])
+        raise
+    if run.stop.is_requested and not run.statistics.frames:
+        raise typer.Exit(exit_status(run))
+    done = write_summary(run, job)
+    show(done)
+    _print_written(done.written)
+    finish(lambda: done, exit_status(run))
+
+
+def frames_text(frames: FramesPart) -> str:
+    """The numbers of frames, in words."""
+    others = {name: getattr(frames, name) for name in ("lost", "unreadable", "other_size")}
+    not_tracked = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items() if count)
+    return f"{frames.read} read, {frames.tracked} tracked{not_tracked}"
 
 
 def run_with_progress(run: TrackingRun, doing: str) -> None:
@@ -68,15 +127,9 @@ def _report_live(count: LiveCount) -> None:
 
 
 def exit_status(run: TrackingRun) -> int:
-    """The exit code: 1 if the run ended early or tracked nothing, 130 if it was stopped by hand, else 0.
-
-    Raises:
-        CmpDesignError: no frame could be read.
-    """
+    """The exit code: 1 if the run ended early or tracked nothing, 130 if it was stopped by hand, else 0."""
     if run.stop.is_requested:
         return 0 if run.source.is_live else EXIT_INTERRUPTED
-    if not run.statistics.frames:
-        raise CmpDesignError(f"{run.source.name}: no frame could be read")
     if run.source.is_live:
         say_text(f"{run.source.times.text}\n")
     if run.ended_early:
@@ -84,17 +137,16 @@ def exit_status(run: TrackingRun) -> int:
     return EXIT_NOT_TRACKED if run.ended_early or not run.statistics.tracked else 0
 
 
-def recover_and_report(output: Path, rows_per_frame: int) -> None:
+def recover_and_report(layout: Path, output: Path, of: Literal["track", "reconstruct"]) -> None:
     """Complete the table of a killed run, and print the numbers of recovered and lost frames; exit with 1 for none.
 
     Raises:
         CmpDesignError: there is no table to recover, or no complete frame is left.
         OutputError: the table cannot be written.
     """
-    from cmpdesign.cli.documents.runs import RecoverDocument
-    from cmpdesign.tracking.sinks.tables import recover_table
+    from cmpdesign.api.sequences import recover_run
 
-    recovered = recover_table(output, rows_per_frame)
+    recovered = recover_run(layout, output, of)
     for problem in recovered.problems:
         print_warning(problem)
     if recovered.frames:
@@ -103,20 +155,12 @@ def recover_and_report(output: Path, rows_per_frame: int) -> None:
         print_warning(
             f"{printable_path(output)}: the run ended before its first frame; the unfinished file is removed"
         )
-    finish(
-        lambda: RecoverDocument(
-            written=printable_path(output) if recovered.frames else None,
-            frames=recovered.frames,
-            problems=tuple(recovered.problems),
-        ),
-        0 if recovered.frames else EXIT_NOT_TRACKED,
-    )
+    finish(lambda: recovered, 0 if recovered.frames else EXIT_NOT_TRACKED)
 
 
-def print_written(paths: Iterable[Path]) -> None:
-    """Print one line for every written file."""
+def _print_written(paths: tuple[str, ...]) -> None:
     for path in paths:
-        say(f"wrote {printable_path(path)}")
+        say(f"wrote {path}")
 
 
 def require_positive(option: str, value: float | None) -> None:

@@ -12,7 +12,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ from cmpdesign.inputs.texts import visible
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from cmpdesign.cli.documents.document import Document
+    from cmpdesign.documents.document import Document
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -113,6 +113,16 @@ def say(*objects: Any, **options: Any) -> None:
     if current_mode().prints_text and sys.stdout is not None:
         with _writing_output():
             console().print(*objects, **options)
+
+
+def say_table(rows: Mapping[str, str]) -> None:
+    """Print names and their values for people, as a table."""
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, value in rows.items():
+        table.add_row(name, value)
+    say(table)
 
 
 def say_text(text: str) -> None:

@@ -19,7 +19,8 @@ from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.names import MOST_NAME_LETTERS, Line, Name, nearest_name
 from cmpdesign.inputs.validation import validation_message
 from cmpdesign.patterns import registered_patterns
-from cmpdesign.patterns.graphs import MAX_LAYERS
+from cmpdesign.patterns.graphs import MAX_LAYERS, TRIANGULAR_GRAPHS
+from cmpdesign.patterns.pad_code import DEFAULT_SHARE, MAX_CODE, MAX_SHARE, MIN_SHARE
 
 # An ellipse flatter than 4 : 1 has cells with corners below 15 degrees, which cannot be printed or read.
 ASPECT_MIN, ASPECT_MAX = 0.25, 4.0
@@ -93,6 +94,20 @@ class Design(_StrictModel):
     mirrored: bool = Field(False, strict=True, description="True if the camera sees the pattern's back.")
     virtual_per_edge: int = Field(
         5, ge=0, le=MAX_VIRTUAL_PER_EDGE, strict=True, description="Number of virtual markers on every edge."
+    )
+
+    code: int = Field(
+        0,
+        ge=0,
+        le=MAX_CODE,
+        strict=True,
+        description="Number of the pad's code: more black cells are white, and parts of the pad are numbered. 0: none.",
+    )
+    code_share: float = Field(
+        DEFAULT_SHARE,
+        ge=MIN_SHARE,
+        le=MAX_SHARE,
+        description="With a code: share of the black cells that are white.",
     )
 
     clip: Literal["none", "rectangle", "circle"] = Field(
@@ -183,6 +198,10 @@ class Design(_StrictModel):
         return ""
 
     def _option_problem(self) -> str:
+        if self.code and registered_patterns()[self.pattern].graph is not TRIANGULAR_GRAPHS:
+            return (
+                f"code = {self.code} is an option of triangular patterns, not of {self.pattern}; leave it out"
+            )
         for option in ("aspect", "spacing"):
             if getattr(self, option) is None or option in registered_patterns()[self.pattern].options:
                 continue

@@ -64,6 +64,8 @@ def layout_document(layout: Layout) -> dict[str, Any]:
             "y": layout.fiducials_mm[:, 1].tolist(),
             "diameter_mm": layout.fiducial_diameter_mm,
         }
+    if layout.code is not None:
+        document["code"] = {"id": layout.code.id, "share": layout.code.share}
     if layout.as_made is not None:
         document["as_made"] = _as_made_object(layout.as_made)
     return document
@@ -71,7 +73,7 @@ def layout_document(layout: Layout) -> dict[str, Any]:
 
 def file_version(layout: Layout) -> int:
     """2 for a layout with a field that version 1 does not know, else 1, so that earlier readers read the file."""
-    return 2 if layout.cell_height_mm else 1
+    return 2 if layout.cell_height_mm or layout.code is not None else 1
 
 
 def pattern_digest(layout: Layout) -> str:

@@ -17,6 +17,7 @@ from cmpdesign.layout.sizing import clip_outline, pattern_centre, resolve_size, 
 from cmpdesign.patterns import PatternShape, registered_patterns
 from cmpdesign.patterns.graphs import MarkerGraph
 from cmpdesign.patterns.numbering import Ints
+from cmpdesign.patterns.pad_code import PadCode, coded_graph
 
 MOST_VIRTUAL_MARKERS = 4_000_000  # of a layout; readers refuse more
 
@@ -28,8 +29,8 @@ def build_layout(design: Design) -> Layout:
     position in the arrays is its id. ``Layout.present`` marks the markers that can be seen.
 
     Raises:
-        DesignError: the sizes cannot be resolved, there are too many virtual markers, or the clip outline removes the
-            reference cell or one of its neighbours.
+        DesignError: the sizes cannot be resolved, there are too many virtual markers, the layers have no such code, or
+            the clip outline removes the reference cell or one of its neighbours.
 
     >>> from cmpdesign import load
     >>> layout = build_layout(load("honeycomb", {"layers": "10", "pitch_mm": "1.5"}))
@@ -41,6 +42,9 @@ def build_layout(design: Design) -> Layout:
     shape, pitch_mm = resolve_size(design)
     pattern = registered_patterns()[design.pattern]
     graph = pattern.graph.make_graph(shape.layers)
+    code = PadCode(design.code, design.code_share) if design.code else None
+    if code is not None:
+        graph = coded_graph(graph, code)
     turn = rotation_matrix(design.rotation_deg).T
     xy_mm = pitch_mm * (pattern.positions(graph.layer, graph.index, shape) @ turn)
     centre_mm = pitch_mm * (pattern_centre(design, shape) @ turn)
@@ -71,6 +75,7 @@ def build_layout(design: Design) -> Layout:
         outline_mm=_round_points(outline_mm + centre_mm),
         fiducials_mm=_round_points(fiducial_positions(design.fiducials, outline_mm + centre_mm)),
         fiducial_diameter_mm=design.fiducials.diameter_mm if design.fiducials.count else 0.0,
+        code=code,
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.patterns.colors import BLACK
+from cmpdesign.patterns.pad_code import PadCode
 
 # Coordinates are rounded to a picometre, so that every machine writes the same digits.
 DECIMALS = 9
@@ -68,6 +69,7 @@ class Layout:
             first point not repeated.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; none by default.
         fiducial_diameter_mm: the marks' diameter.
+        code: the pad's code; None: the reference cell alone is white.
         as_made: differences of a made pad from the design; None: as designed.
     """
 
@@ -87,6 +89,7 @@ class Layout:
     outline_mm: NDArray[np.float64]
     fiducials_mm: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     fiducial_diameter_mm: float = 0.0
+    code: PadCode | None = None
     as_made: AsMade | None = None
 
     def __post_init__(self) -> None:

@@ -15,6 +15,7 @@ from cmpdesign.layout.checks import CAMERA_PX, Finding, check_design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.measures import cell_angles_deg, cell_widths_mm, edge_lengths_mm
 from cmpdesign.patterns.colors import COLORS
+from cmpdesign.patterns.pad_code import CodeFigures, code_figures
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ class DesignReport:
         smallest_feature_mm: diameter of the largest circle inside the narrowest cell.
         sharpest_corner_deg: the smallest inner angle of all cells.
         digest: the layout's digest.
+        code: key figures of the pad's code; None without a code.
         findings: the findings of ``check_design``.
     """
 
@@ -53,6 +55,7 @@ class DesignReport:
     smallest_feature_mm: float
     sharpest_corner_deg: float
     digest: str
+    code: CodeFigures | None
     findings: tuple[Finding, ...]
 
 
@@ -84,8 +87,14 @@ def design_report(design: Design, layout: Layout, camera_px: tuple[int, int] = C
         smallest_feature_mm=round(float(cell_widths_mm(layout).min()), 6),
         sharpest_corner_deg=round(float(cell_angles_deg(layout).min()), 6),
         digest=layout.digest,
+        code=None if layout.code is None else code_figures(int(layout.parameters["layers"]), layout.code),
         findings=tuple(check_design(design, layout, camera_px)),
     )
+
+
+def report_values(figures: DesignReport) -> dict[str, Any]:
+    """The key figures by name; a design without a code has none of a code."""
+    return {name: value for name, value in asdict(figures).items() if (name, value) != ("code", None)}
 
 
 def report_to_json(figures: DesignReport, products: Mapping[str, Mapping[str, Any]] | None = None) -> str:
@@ -93,7 +102,7 @@ def report_to_json(figures: DesignReport, products: Mapping[str, Mapping[str, An
     document = {
         "format": "cmp-report",
         "version": 1,
-        **asdict(figures),
+        **report_values(figures),
         **(products or {}),
         "generator": f"cmpdesign {__version__}",
     }

@@ -8,6 +8,7 @@ void add_encoding(nb::module_ module);
 void add_depth_buffer(nb::module_ module);
 void add_elastic_layer(nb::module_ module);
 void add_tour(nb::module_ module);
+void add_pad_code(nb::module_ module);
 }  // namespace cmp
 
 NB_MODULE(_native, module) {
@@ -18,4 +19,5 @@ NB_MODULE(_native, module) {
   cmp::add_depth_buffer(module.def_submodule("depth_buffer"));
   cmp::add_elastic_layer(module.def_submodule("elastic_layer"));
   cmp::add_tour(module.def_submodule("tour"));
+  cmp::add_pad_code(module.def_submodule("pad_code"));
 }

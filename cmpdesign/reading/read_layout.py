@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cmpdesign.layout.layout import AsMade, Layout, equal_length_outlines
 from cmpdesign.layout.side import seen_side
+from cmpdesign.patterns.pad_code import PadCode
 
 if TYPE_CHECKING:
     from extractor.layout.reference import Reference
@@ -42,6 +43,7 @@ def layout_from_reference(reference: Reference) -> Layout:
         outline_mm=reference.outline_mm,
         fiducials_mm=reference.fiducials_mm,
         fiducial_diameter_mm=reference.fiducial_diameter_mm,
+        code=None if reference.code is None else PadCode(reference.code.id, reference.code.share),
         as_made=_as_made(reference),
     )
 

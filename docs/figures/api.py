@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from enum import Enum
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import Any, is_typeddict
 
 WIDTH = 100  # letters of a signature on one line
 SECTIONS = ("Args", "Attributes", "Keys", "Returns", "Raises", "Yields")
@@ -16,7 +16,7 @@ HEAD = """# Python
 
 <!-- written by python -m docs.figures -->
 
-Whatever a command does is one call of `cmpdesign`; `extractor` reads pictures and needs numpy and OpenCV alone.
+Most commands are one call of `cmpdesign`; `extractor` reads pictures and needs numpy and OpenCV alone.
 [From Python](../how-to/python.md) shows how they are used together. `help(NAME)` prints what stands here.
 """
 EXAMPLE = re.compile(r"^(>>> |\.\.\. )|  # doctest: .*$", re.MULTILINE)
@@ -44,7 +44,7 @@ def _entry(name: str, found: Any) -> str:
     lines = [f"### {name}", ""]
     if isinstance(found, type) and issubclass(found, Enum):
         lines += [_text(_doc(found)), "", ", ".join(f"`{each.name}`" for each in found)]
-    elif isinstance(found, type) and issubclass(found, Exception):
+    elif (isinstance(found, type) and issubclass(found, Exception)) or is_typeddict(found):
         lines += [_text(_doc(found))]
     elif callable(found):
         lines += ["```text", _signature(name, found), "```", "", _text(_doc(found))]

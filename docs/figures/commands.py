@@ -10,9 +10,9 @@ import typer
 from typer.main import get_command
 
 from cmpdesign.cli import app
-from cmpdesign.cli.documents.document import Message
-from cmpdesign.cli.documents.registry import DOCUMENTS
 from cmpdesign.cli.options.output import NAMES, output_parameters
+from cmpdesign.documents.document import Message
+from cmpdesign.documents.registry import DOCUMENTS
 
 HEAD = """# The command line
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.layout.json_fields import MAX_INT, MAX_MM, fail
+from extractor.layout.json_fields import MAX_INT, MAX_MM, fail, shown
 from extractor.layout.lattice import NEIGHBOUR_STEPS, axial_coordinates
 
 BLACK, WHITE = 3, 4
@@ -23,6 +23,7 @@ UP_CORNERS, DOWN_CORNERS = np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0, 0],
 MIN_OUTLINE = 3
 MAX_CELL_HEIGHT_MM = 10.0
 COLOR_COUNT = 5
+MAX_CODE = 255
 MAX_VIRTUAL_PER_EDGE = 1000
 MAX_VIRTUAL_MARKERS = 4_000_000  # of a layout; a result holds 49 bytes for each virtual marker
 
@@ -248,12 +249,39 @@ def _check_reference_cell(reference: Pattern, triangular: bool) -> None:
     if marker not in reference.cell_corners[cell]:
         fail("reference.marker", str(marker), f"a corner of the reference cell {cell}")
     if not triangular:
+        if reference.code is not None:
+            fail("code", shown(reference.code), "no code of a pattern without triangles")
         return
-    white = np.flatnonzero(reference.cell_color == WHITE).tolist()
-    if white != [cell]:
-        fail("reference.cell", str(cell), f"the only white cell; white are {white[:5]}")
+    white = np.flatnonzero(reference.cell_color == WHITE)
+    if reference.code is not None:
+        _check_code(reference, white)
+    elif white.tolist() != [cell]:
+        fail("reference.cell", str(cell), f"the only white cell; white are {white[:5].tolist()}")
     if marker != 0:
         fail("reference.marker", str(marker), "0, where the numbering of layers starts")
+
+
+def _check_code(reference: Pattern, white: NDArray[np.int_]) -> None:
+    """Check a code, and that its white cells are several, with the reference cell, and none in an ink's place."""
+    _check_whole(reference.code.id, "code.id", MAX_CODE)
+    share = reference.code.share
+    if type(share) not in (int, float) or not 0 < share < 1:
+        fail("code.share", shown(share), "a number between 0 and 1")
+    if reference.reference_cell not in white or len(white) < 2:
+        fail(
+            "reference.cell",
+            str(reference.reference_cell),
+            f"one of several white cells of a code; white are {white[:5].tolist()}",
+        )
+    axial = axial_coordinates(reference.layer, reference.index)
+    # The corners of an up-cell (q, r), which has an ink, add up to (3q + 1, 3r + 1).
+    wrong = white[(axial[reference.cell_corners[white]].sum(axis=1) % 3 == 1).all(axis=1)]
+    if len(wrong):
+        fail(
+            f"cells.color[{wrong[0]}]",
+            "white",
+            "the ink of its place; a code has white cells instead of black ones",
+        )
 
 
 def _check_colors(reference: Pattern) -> None:

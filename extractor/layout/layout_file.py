@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from extractor.errors import LayoutError
 from extractor.layout import json_fields as fields
 from extractor.layout.as_made_fields import read_as_made
-from extractor.layout.consistency import MAX_VIRTUAL_PER_EDGE
-from extractor.layout.reference import COLORS, Reference
+from extractor.layout.consistency import MAX_CODE, MAX_VIRTUAL_PER_EDGE
+from extractor.layout.reference import COLORS, PadCode, Reference
 from extractor.layout.text_file import printable_path, read_text_file
 
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
@@ -29,7 +29,7 @@ FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",
     "reference", "palette", "border_mm", "outline", "generator", "digest",
 )  # fmt: skip
-OPTIONAL_FIELDS = ("fiducials", "as_made")
+OPTIONAL_FIELDS = ("fiducials", "code", "as_made")
 VERSIONS = (1, 2)
 
 
@@ -132,6 +132,7 @@ def _checked_reference(document: dict[str, Any]) -> Reference:
         digest=fields.text_field(document["digest"], "digest"),
         fiducials_mm=fiducials_mm,
         fiducial_diameter_mm=fiducial_diameter_mm,
+        code=_code(document),
         as_made=read_as_made(document, count),
     )
     _check_digest(reference)
@@ -177,6 +178,16 @@ def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
     y_mm = fields.lengths_mm(marks["y"], "fiducials.y", count)
     diameter_mm = fields.length_mm(marks["diameter_mm"], "fiducials.diameter_mm")
     return np.column_stack([x_mm, y_mm]), diameter_mm
+
+
+def _code(document: dict[str, Any]) -> PadCode | None:
+    """The pad's code; None for a plain pattern, with one white cell."""
+    fields.require_version_2(document, ("code",), "", document["version"])
+    if "code" not in document:
+        return None
+    code = fields.mapping(document["code"], "code")
+    fields.known_fields(code, ("id", "share"), "code.")
+    return PadCode(fields.integer(code["id"], "code.id", 1, MAX_CODE), code["share"])
 
 
 def _check_digest(reference: Reference) -> None:

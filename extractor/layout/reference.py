@@ -49,6 +49,19 @@ class AsMade(FrozenRecord):
             self.covariance_mm2.setflags(write=False)
 
 
+@dataclass(frozen=True)
+class PadCode:
+    """The code of a pad: which black cells of the plain pattern are white.
+
+    Attributes:
+        id: 1 to 255.
+        share: the share of white cells among the cells that are black or white, before clipping.
+    """
+
+    id: int
+    share: float
+
+
 @dataclass(frozen=True, eq=False)
 class Reference(FrozenRecord):
     """A pattern as the layout file describes it, in read-only arrays and mappings.
@@ -73,6 +86,7 @@ class Reference(FrozenRecord):
         digest: SHA-256 (hex) of the geometry.
         fiducials_mm: (F, 2) float64, centres of the marks around the pattern; empty without marks.
         fiducial_diameter_mm: diameter of these marks.
+        code: the pad's code; None: the reference cell alone is white.
         as_made: differences of a made pad from its design; None for a pad as designed.
 
     Raises:
@@ -96,6 +110,7 @@ class Reference(FrozenRecord):
     digest: str
     fiducials_mm: NDArray[np.float64] = with_default(default_factory=lambda: np.empty((0, 2)))
     fiducial_diameter_mm: float = 0.0
+    code: PadCode | None = None
     as_made: AsMade | None = None
 
     def __repr__(self) -> str:

@@ -12,6 +12,7 @@ from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.measure.marker_scatter import NO_SCATTER, MarkerScatter
+from extractor.refine.relief import Parallax
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.ink_levels import InkLevels, level_change
 
@@ -28,6 +29,7 @@ class Appearance(NamedTuple):
         noise: gray levels, one channel, from the residual.
         levels: of the inks.
         pixel_noise: gray levels, one channel, from neighbouring pixels: independent of the pattern's drawing.
+        parallax: of cells above or below the black, kept along a sequence; None for flat pads.
     """
 
     scale: int
@@ -35,6 +37,7 @@ class Appearance(NamedTuple):
     noise: float
     levels: InkLevels
     pixel_noise: float
+    parallax: Parallax | None = None
 
     def with_lighting(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Appearance:
         """The appearance in another light.

@@ -7,6 +7,7 @@ One such step is nearly enough.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,8 +96,22 @@ class Refiner:
         Args:
             pyramid: the image.
             places: the markers' places, to about a pixel.
-            before: the appearance of the previous image of a sequence.
+            before: the appearance of the previous image of a sequence, whose parallax is kept: a contact must not
+                move it, as all displacements would change.
         """
+        refined = self._apparent_markers(pyramid, places, before)
+        found = refined.appearance.parallax
+        if found is None:
+            return refined
+        parallax = before.parallax if before is not None and before.parallax is not None else found
+        xy_px, cov_px2, points = without_parallax(parallax, refined.xy_px, refined.cov_px2, refined.points)
+        appearance = refined.appearance._replace(parallax=parallax)
+        return replace(refined, xy_px=xy_px, cov_px2=cov_px2, points=points, appearance=appearance)
+
+    def _apparent_markers(
+        self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None
+    ) -> RefinedMarkers:
+        """The markers where the picture shows them; see ``__call__``."""
         usual_edge = short_edge(places.xy_px, self._topology.edges, SHORT_RARITY)
         if before is not None and before.scale == self._reduction_scale(
             before.scale * before.sigma, usual_edge
@@ -216,13 +231,13 @@ class Refiner:
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
         xy, cov = native.at_full_scale(xy, cov, places, scale, FULL_SCALE_LIMITS)
+        parallax = None
         if self._topology.cell_height != 0.0:
             beside = measure_virtual_markers(view, picture, reading, RELIEF_POINTS)[..., :2]
             size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
             parallax = find_parallax(self._topology, xy, beside, size_px)
-            xy, cov, points = without_parallax(parallax, xy, cov, points)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
-        appearance = Appearance(scale, *look)
+        appearance = Appearance(scale, *look, parallax)
         blur, noise = scale * estimate.sigma, scale * estimate.noise
         return RefinedMarkers(
             xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)

@@ -1,13 +1,8 @@
-"""One view of a sensor: a pinhole with OpenCV's distortion, direct or through mirrors, and its exact inverse.
+"""One view of a sensor: a camera with a lens, direct or through mirrors.
 
 Camera frame: x right, y down, z forward; x_camera = R x_layout + t. An odd number of mirrors between the pattern and
 the camera makes det R = -1: such a view is the mirrored picture of a virtual camera.
-Distortion (k1, k2, p1, p2, k3) acts on normalised coordinates x = X / Z, y = Y / Z, r^2 = x^2 + y^2:
-
-    x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
-    y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
-
-The model is valid up to the fold radius, at which the radial part turns back. Points beyond it have no picture.
+A direction (X / Z, Y / Z) passes the lens, see ``lens``; points beyond its fold radius have no picture.
 Where a window and a gel lie before the pattern, X, Y, Z are the direction in which the camera sees it, see ``medium``.
 """
 
@@ -21,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.errors import RigError
+from extractor.space.lens import COUNTS, Lens, LensKind
 from extractor.space.medium import (
     Lines,
     Medium,
@@ -36,21 +32,7 @@ from extractor.space.medium import (
 Array = NDArray[np.float64]
 
 NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
-MAX_ITERATIONS = 60  # of Newton's method
-CONVERGED = 1e-13  # error in normalised coordinates, far below the accuracy of a pixel
-ACCEPTED = 1e-9  # error in normalised coordinates above which a point has no inverse
-MAX_HALVINGS = 12  # of a Newton step
 MAX_ORTHONORMALITY_ERROR = 1e-6  # of R R^T from the identity
-
-
-class Distortion(NamedTuple):
-    """The coefficients of OpenCV's distortion, see the module."""
-
-    k1: float
-    k2: float
-    p1: float
-    p2: float
-    k3: float
 
 
 class Linearisation(NamedTuple):
@@ -58,12 +40,14 @@ class Linearisation(NamedTuple):
 
     Attributes:
         xy_px: (N, 2) float64, in the frame of the full image.
+        directions: (N, 2) float64, X / Z and Y / Z in which the camera sees the points.
         by_point: (N, 2, 3) float64, px/mm, by the point in the layout frame.
         by_pose: (N, 2, 6) float64, by the pose: a turn (rad) of the pattern about the layout's origin along the
             camera's axes, then a shift (mm) along these axes.
     """
 
     xy_px: Array
+    directions: Array
     by_point: Array
     by_pose: Array
 
@@ -76,7 +60,7 @@ class View:
         name: for messages and files.
         focal_px: (fx, fy).
         centre_px: (cx, cy), the principal point, in the frame of the full image.
-        distortion: (k1, k2, p1, p2, k3).
+        distortion: the lens' coefficients, see ``lens``.
         area_px: (x, y, width, height) of the part of the image that this view fills; None: the whole image.
         mirrored: an odd number of mirrors between the pattern and the camera; None: by det R, False without R.
         R_camera_from_layout: (3, 3) float64, orthonormal, det -1 where mirrored; None: not known.
@@ -84,6 +68,7 @@ class View:
         medium: layers between the pattern and the camera; None or layers of 0 mm: air.
         window: the window's outer face in the camera's frame; the gel then reaches from the window to the pattern.
             None: the window is parallel to the pattern at rest, ``gel_mm`` before it.
+        lens: the model of the lens.
 
     Raises:
         RigError: a value that is impossible for a camera.
@@ -99,6 +84,7 @@ class View:
     t_camera_from_layout_mm: Any = None
     medium: Medium | None = None
     window: WindowPlane | None = None
+    lens: LensKind = "perspective"
 
     def __post_init__(self) -> None:
         self._check_intrinsics()
@@ -118,11 +104,14 @@ class View:
         object.__setattr__(self, "mirrored", bool(np.linalg.det(rotation) < 0))
 
     def _check_intrinsics(self) -> None:
-        for name, count in (("focal_px", 2), ("centre_px", 2), ("distortion", 5)):
+        if self.lens not in COUNTS:
+            raise RigError(f"view {self.name!r}: lens is {self.lens!r}; expected one of {', '.join(COUNTS)}")
+        for name, counts in (("focal_px", (2,)), ("centre_px", (2,)), ("distortion", COUNTS[self.lens])):
             values = np.asarray(getattr(self, name), np.float64)
-            if values.shape != (count,) or not np.isfinite(values).all():
+            if values.ndim != 1 or len(values) not in counts or not np.isfinite(values).all():
                 raise RigError(
-                    f"view {self.name!r}: {name} is {getattr(self, name)}; expected {count} finite numbers"
+                    f"view {self.name!r}: {name} is {getattr(self, name)}; "
+                    f"expected {counts_text(counts)} finite numbers"
                 )
             object.__setattr__(self, name, tuple(float(v) for v in values))
         if min(self.focal_px) <= 0:
@@ -187,14 +176,13 @@ class View:
         return place_window(self.medium, self.window, self.R_camera_from_layout, self.t_camera_from_layout_mm)
 
     @cached_property
+    def _lens(self) -> Lens:
+        return Lens(self.lens, self.distortion)
+
+    @property
     def fold_radius(self) -> float:
-        """The normalised radius at which the radial distortion turns back; infinite without one."""
-        k = Distortion(*self.distortion)
-        # roots in 1 / r^2, so that weak coefficients do not overflow
-        inverse_squares = np.roots([1.0, 3 * k.k1, 5 * k.k2, 7 * k.k3])
-        real = inverse_squares.real[abs(inverse_squares.imag) <= 1e-9 * abs(inverse_squares)]
-        largest = float(real.max(initial=0.0))
-        return float(1 / np.sqrt(largest)) if largest > 1e-12 else np.inf
+        """The normalised radius up to which the lens is valid; infinite without a limit."""
+        return self._lens.fold_radius
 
     def at(self, rotation: Array, shift: Array) -> View:
         """The same view with this pose."""
@@ -203,6 +191,14 @@ class View:
     def project(self, xyz_mm: Array) -> Array:
         """(N, 2) px of points (N, 3) mm in the layout frame; NaN behind the camera and beyond the fold radius."""
         return self.linearised(xyz_mm).xy_px
+
+    def by_lens(self, directions: Array) -> Array:
+        """(N, 2, 4 + K) derivatives of the pictures of directions (N, 2) by fx, fy, cx, cy and the coefficients."""
+        columns = np.zeros((len(directions), 2, 4 + len(self.distortion)))
+        columns[:, [0, 1], [0, 1]] = self._lens.distort(directions).xy
+        columns[:, [0, 1], [2, 3]] = 1
+        columns[:, :, 4:] = np.array(self.focal_px)[:, None] * self._lens.by_coefficients(directions)
+        return columns
 
     def linearised(self, xyz_mm: Array) -> Linearisation:
         """The projections of points (N, 3) mm in the layout frame, and their derivatives by point and pose."""
@@ -215,22 +211,21 @@ class View:
         depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
         normalised = camera[:, :2] / depth[:, None]
         normalised[np.hypot(*normalised.T) >= self.fold_radius] = np.nan
-        distorted, by_normalised = distort_points(normalised, self.distortion)
+        distorted = self._lens.distort(normalised)
         by_camera = np.zeros((len(normalised), 2, 3))
         by_camera[:, 0, 0] = by_camera[:, 1, 1] = 1 / depth
         by_camera[:, :, 2] = -normalised / depth[:, None]
-        by_camera = np.array(self.focal_px)[:, None] * (by_normalised @ by_camera)
-        xy_px = distorted * self.focal_px + self.centre_px
+        by_camera = np.array(self.focal_px)[:, None] * (distorted.by_direction @ by_camera)
+        xy_px = distorted.xy * self.focal_px + self.centre_px
         if seen is not None:
             by_point = by_camera @ seen.by_point @ self.R_camera_from_layout
-            return Linearisation(xy_px, by_point, by_camera @ seen.by_pose)
+            return Linearisation(xy_px, normalised, by_point, by_camera @ seen.by_pose)
         by_pose = np.concatenate([by_camera @ -cross_matrix(rotated), by_camera], axis=2)
-        return Linearisation(xy_px, by_camera @ self.R_camera_from_layout, by_pose)
+        return Linearisation(xy_px, normalised, by_camera @ self.R_camera_from_layout, by_pose)
 
     def normalised(self, xy_px: Array) -> Array:
         """(N, 2) undistorted X / Z, Y / Z of pixels (N, 2); NaN where the distortion has no inverse."""
-        distorted = np.asarray((xy_px - self.centre_px) / self.focal_px)
-        return undistort_points(distorted, self.distortion, self.fold_radius)
+        return self._lens.undistort(np.asarray((xy_px - self.centre_px) / self.focal_px))
 
     def rays(self, xy_px: Array) -> Lines:
         """The lines of sight of pixels (N, 2) in the layout frame, at the pattern.
@@ -255,6 +250,11 @@ class View:
         return np.isfinite(gel_depth_mm(self._placed_window, camera))
 
 
+def counts_text(counts: tuple[int, ...]) -> str:
+    """ "5, 8 or 12", for messages."""
+    return " or ".join(", ".join(map(str, counts)).rsplit(", ", 1))
+
+
 def is_finite(values: Array, axes: int = 1) -> NDArray[np.bool_]:
     """Whether all numbers along this number of last axes are finite."""
     return np.asarray(np.isfinite(values).all(axis=tuple(range(-axes, 0))))
@@ -265,100 +265,3 @@ def is_covariance(cov_px2: Array) -> NDArray[np.bool_]:
     safe = np.where(is_finite(cov_px2, 2)[..., None, None], cov_px2, 0.0)
     determinant = safe[..., 0, 0] * safe[..., 1, 1] - safe[..., 0, 1] * safe[..., 1, 0]
     return np.asarray((safe[..., 0, 0] > 0) & (determinant > 0))
-
-
-def distort_points(normalised: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
-    """(N, 2) distorted coordinates of undistorted ones (N, 2), and their derivatives (N, 2, 2).
-
-    Args:
-        normalised: X / Z, Y / Z.
-        distortion: (k1, k2, p1, p2, k3).
-    """
-    k = Distortion(*distortion)
-    p1, p2 = k.p1, k.p2
-    x, y = normalised.T
-    r2 = x * x + y * y
-    radial = 1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3))
-    slope = 2 * (k.k1 + r2 * (2 * k.k2 + r2 * 3 * k.k3))  # 2 d radial / d r^2
-    distorted = np.column_stack(
-        [
-            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-        ]
-    )
-    derivatives = np.empty((len(normalised), 2, 2))
-    derivatives[:, 0, 0] = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
-    derivatives[:, 1, 1] = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
-    derivatives[:, 0, 1] = derivatives[:, 1, 0] = slope * x * y + 2 * p1 * x + 2 * p2 * y
-    return distorted, derivatives
-
-
-def undistort_points(distorted: Array, distortion: tuple[float, ...], fold_radius: float = np.inf) -> Array:
-    """(N, 2) undistorted coordinates of distorted ones (N, 2), by damped Newton steps to 1e-13; NaN without an inverse.
-
-    The usual fixed-point iteration may diverge at strong distortion without an error. A result of this function lies
-    within the fold radius and is mapped onto the input again.
-    """
-    if not any(distortion):
-        return distorted.copy()
-    radius = np.hypot(*distorted.T)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        normalised = distorted * np.minimum(1.0, 0.9 * fold_radius / radius)[:, None]
-    normalised[radius == 0] = 0.0
-    error = np.full(len(distorted), np.inf)
-    for _ in range(MAX_ITERATIONS):
-        predicted, derivatives = distort_points(normalised, distortion)
-        residual = distorted - predicted
-        error = np.hypot(*residual.T)
-        active = np.flatnonzero(error > CONVERGED * (1 + radius))
-        if not len(active):
-            break
-        step = _newton_step(residual[active], derivatives[active])
-        moved = _damped_step(
-            normalised[active], step, distorted[active], error[active], distortion, fold_radius
-        )
-        if np.array_equal(moved, normalised[active], equal_nan=True):
-            break
-        normalised[active] = moved
-    _, derivatives = distort_points(normalised, distortion)
-    valid = np.asarray((error < ACCEPTED * (1 + radius)) & (np.hypot(*normalised.T) < fold_radius))
-    valid &= np.linalg.det(np.where(np.isfinite(derivatives), derivatives, 0.0)) > 0
-    normalised[~valid] = np.nan
-    return np.asarray(normalised)
-
-
-def _newton_step(residual: Array, derivatives: Array) -> Array:
-    """(N, 2) solutions of 2 x 2 systems (N, 2, 2) for residuals (N, 2); not finite where singular."""
-    (a, b), (c, d) = derivatives.transpose(1, 2, 0)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        step = np.column_stack(
-            [d * residual[:, 0] - b * residual[:, 1], a * residual[:, 1] - c * residual[:, 0]]
-        )
-        step /= (a * d - b * c)[:, None]
-    return step
-
-
-def _damped_step(
-    start: Array,
-    step: Array,
-    distorted: Array,
-    error: Array,
-    distortion: tuple[float, ...],
-    fold_radius: float,
-) -> Array:
-    """(N, 2) points after their steps, each halved until its ``error`` (N,) decreases within the fold radius.
-
-    Points whose error does not decrease are not moved.
-    """
-    moved = start.copy()
-    waiting = np.isfinite(step).all(axis=1)
-    for _ in range(MAX_HALVINGS):
-        tried = start + step
-        better = np.hypot(*(distorted - distort_points(tried, distortion)[0]).T) < error
-        better &= waiting & (np.hypot(*tried.T) < fold_radius)
-        moved[better] = tried[better]
-        waiting &= ~better
-        if not waiting.any():
-            break
-        step = 0.5 * step
-    return moved

@@ -6,7 +6,8 @@ A scene file or a sensor file can also be used as a rig: only its [[view]] table
 name = "left"
 focal_px = [900.0, 900.0]
 centre_px = [319.5, 239.5]
-distortion = [0.0, 0.0, 0.0, 0.0, 0.0]     # k1, k2, p1, p2, k3; may be left out
+lens = "perspective"                       # or "fisheye"; may be left out
+distortion = [0.0, 0.0, 0.0, 0.0, 0.0]     # 5, 8 or 12 coefficients, of a fisheye lens 4; may be left out
 area_px = [0, 0, 320, 480]                 # x, y, width, height; left out: the whole image
 mirrored = false                           # an odd number of mirrors in between; may be left out
 # R_camera_from_layout = [[...], [...], [...]], t_camera_from_layout_mm = [...]: left out: from the rest frame
@@ -30,24 +31,33 @@ from typing import Any, NoReturn
 from extractor.errors import RigError
 from extractor.layout.json_fields import nearest_name, shown
 from extractor.layout.text_file import printable_path, read_text_file
-from extractor.space.camera import View
+from extractor.space.camera import View, counts_text
+from extractor.space.lens import COUNTS
 from extractor.space.medium import Medium, WindowPlane
 
 NUMBER_COUNTS = {
     "focal_px": 2,
     "centre_px": 2,
-    "distortion": 5,
     "area_px": 4,
     "t_camera_from_layout_mm": 3,
     "window_normal": 3,
 }
 REQUIRED_FIELDS = ("focal_px", "centre_px")
-KNOWN_FIELDS = ("name", *NUMBER_COUNTS, "mirrored", "R_camera_from_layout", "window_distance_mm")
+KNOWN_FIELDS = (
+    "name",
+    *NUMBER_COUNTS,
+    "lens",
+    "distortion",
+    "mirrored",
+    "R_camera_from_layout",
+    "window_distance_mm",
+)
 MEDIUM_FIELDS = ("gel_mm", "gel_index", "window_mm", "window_index")
 # Other tables in the files of scenes and of sensors; they have no properties of the views.
 OTHER_TABLES = (
     "size_px", "seed", "camera", "surface", "contact", "light", "background", "optics", "sensor", "damage", "inks",
     "sequence", "name", "description", "source", "patterns", "elastomer", "response", "load", "conditions",
+    "layout", "calibration",
 )  # fmt: skip
 MAX_BYTES = 1 << 24  # of a rig file
 MAX_VIEWS = 64
@@ -162,6 +172,7 @@ def _parse_view(table: Mapping[str, Any], index: int, medium: Medium | None) -> 
                 )
         distance_mm = _parse_number(table["window_distance_mm"], prefix + "window_distance_mm", False)
         values["window"] = WindowPlane(values.pop("window_normal"), distance_mm)
+    values |= _parse_lens(table, prefix)
     name = table.get("name", f"view{index}")
     if not isinstance(name, str) or not name or not name.isprintable():
         _raise_rig_error(prefix + "name", shown(name), "a printable text")
@@ -174,6 +185,17 @@ def _parse_view(table: Mapping[str, Any], index: int, medium: Medium | None) -> 
             table["R_camera_from_layout"], prefix + "R_camera_from_layout"
         )
     return View(name=name, medium=medium, **values)
+
+
+def _parse_lens(table: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    kind = table.get("lens", "perspective")
+    if kind not in COUNTS:
+        _raise_rig_error(prefix + "lens", shown(kind), " or ".join(f'"{name}"' for name in COUNTS))
+    value, counts = table.get("distortion", [0.0] * COUNTS[kind][0]), COUNTS[kind]
+    if not isinstance(value, list) or len(value) not in counts:
+        _raise_rig_error(prefix + "distortion", shown(value), f"{counts_text(counts)} numbers")
+    numbers = _parse_numbers(value, prefix + "distortion", len(value), False)
+    return {"lens": kind, "distortion": numbers}
 
 
 def _parse_matrix(value: object, field: str) -> list[tuple[float, ...]]:

@@ -278,6 +278,9 @@ class Tracker:
     ) -> None:
         last = self._state
         assert self._tables is not None
+        if appearance is not None and last is not None and last.appearance is not None:
+            # cells above or below the black: the parallax of the first frame, also after a cold start
+            appearance = appearance._replace(parallax=last.appearance.parallax)
         level = self._level_of_check(pyramid, markers.xy_px)
         at_rest = resting_shifts(level.image, level.to_level(markers.xy_px), self._tables, cell_levels)
         self._state = _TrackState(

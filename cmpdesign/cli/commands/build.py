@@ -53,11 +53,10 @@ def build(
     are all files of an earlier build of another pattern, unless they were changed since. Pads of lasers, molds and
     prints are read as the camera sees the pads before files are written. Exit code 1: a finding is an error.
     """
-    from dataclasses import asdict
-
-    from cmpdesign.cli.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
+    from cmpdesign.documents.designs import BuildDocument, finding_parts, reading_parts
     from cmpdesign.layout.build import build_layout
+    from cmpdesign.layout.report import report_values
     from cmpdesign.products.building import build_files
     from cmpdesign.watch import watched
 
@@ -90,7 +89,7 @@ def build(
             folder=printable_path(output),
             written=tuple(map(printable_path, built.written)),
             removed=tuple(map(printable_path, built.removed)),
-            report={name: value for name, value in asdict(built.report).items() if name != "findings"},
+            report={name: value for name, value in report_values(built.report).items() if name != "findings"},
             as_made=reading_parts(built.readings),
             findings=finding_parts(built.findings),
         ),
@@ -126,6 +125,8 @@ def print_report(report: DesignReport) -> None:
         "overall size": "{:.2f} x {:.2f} mm, border included".format(*report.size_mm),
         "smallest feature": f"{report.smallest_feature_mm:.3f} mm (circle inside the narrowest cell)",
     }
+    if report.code is not None:
+        rows["code"] = report.code.line()
     table = Table(box=None, show_header=False, pad_edge=False)
     for name, value in rows.items():
         table.add_row(name, value)

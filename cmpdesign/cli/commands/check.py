@@ -39,9 +39,10 @@ def check(
     preset: PresetOption = "balanced",
 ) -> None:
     """List the features of a design that cannot be made or read. Exit code 1: a finding is an error."""
-    from cmpdesign.cli.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.design.design import load_design
+    from cmpdesign.documents.designs import CheckDocument, finding_parts, reading_parts
     from cmpdesign.layout.build import build_layout
+    from cmpdesign.patterns.pad_code import code_figures
     from cmpdesign.products.building import check_products
     from cmpdesign.watch import watched
 
@@ -55,6 +56,8 @@ def check(
         say(f"{name} as made: {reading.line()}")
     for name, reason in checked.unread.items():
         print_warning(f"{name} is not read: {reason}")
+    if layout.code is not None:
+        say(f"code {code_figures(int(layout.parameters['layers']), layout.code).line()}")
     _print_findings(checked.findings)
     finish(
         lambda: CheckDocument(

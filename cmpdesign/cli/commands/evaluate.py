@@ -184,7 +184,7 @@ class _Run(NamedTuple):
     files: Sequence[Path]
 
     def finish(self) -> None:
-        from cmpdesign.cli.documents.runs import EvaluateDocument
+        from cmpdesign.documents.runs import EvaluateDocument
 
         written = tuple(map(printable_path, self.files))
         finish(lambda: EvaluateDocument(written=written, report=dict(self.document)))

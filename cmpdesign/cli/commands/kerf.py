@@ -49,7 +49,7 @@ def kerf(
 ) -> None:
     """Measure the kerf on a cut coupon, and print the lines for the material's file."""
     from cmpdesign.api import workshop
-    from cmpdesign.cli.documents.reading import KerfDocument
+    from cmpdesign.documents.reading import KerfDocument
     from cmpdesign.products.laser.coupon.design import load_coupon
 
     cut_coupon = load_coupon(coupon)

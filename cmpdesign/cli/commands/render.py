@@ -172,7 +172,7 @@ def _option_names_in_errors() -> Iterator[None]:
 
 def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: Path | None) -> None:
     """Render a scene of (width, height) pixels; write the image and, if asked for, the truth."""
-    from cmpdesign.cli.documents.runs import RenderDocument
+    from cmpdesign.documents.runs import RenderDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import encode_image
     from cmpdesign.scene import render as render_scene

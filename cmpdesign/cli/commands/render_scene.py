@@ -76,7 +76,7 @@ def _finish(
     file: SceneFile, output: Path, truth: Path | None, words: str, visible: tuple[int, ...] | None
 ) -> None:
     """Print the written files."""
-    from cmpdesign.cli.documents.runs import RenderDocument
+    from cmpdesign.documents.runs import RenderDocument
 
     if truth is not None:
         say(f"wrote {printable_path(truth)}")

@@ -35,7 +35,7 @@ def size(
     ] = None,
 ) -> None:
     """Propose pitch and layers for a camera and its field of view, with the markers' predicted error."""
-    from cmpdesign.cli.documents.designs import SizeDocument
+    from cmpdesign.documents.designs import SizeDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.proposal import camera_design
 

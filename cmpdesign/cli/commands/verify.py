@@ -35,7 +35,7 @@ from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.api.pictures import Verifier
-    from cmpdesign.cli.documents.reading import VerifyDocument
+    from cmpdesign.documents.reading import VerifyDocument
     from cmpdesign.files.images import Image
     from cmpdesign.products.sheet.verdict import SheetVerdict
     from cmpdesign.reading.problem_report import ProblemReport
@@ -245,7 +245,7 @@ def _format_verdict(verdict: Verdict | SheetVerdict) -> str:
 
 
 def _to_document(reference: Reference, outcomes: list[Outcome], min_share: float) -> VerifyDocument:
-    from cmpdesign.cli.documents.reading import ImagePart, VerifyDocument
+    from cmpdesign.documents.reading import ImagePart, VerifyDocument
 
     return VerifyDocument(
         format="cmp-verification",

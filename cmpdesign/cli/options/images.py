@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated
 
 import typer
+
+from cmpdesign.inputs.options import Channels, Preset, Side
 
 MaxPixelsOption = Annotated[
     int,
@@ -17,40 +20,30 @@ MaxPixelsOption = Annotated[
 ]
 
 ChannelsOption = Annotated[
-    Literal["bgr", "rgb"],
+    Channels,
     typer.Option(
         "--channels", help="rgb: the pictures' red and blue are swapped, as an RGB array saved by OpenCV."
     ),
 ]
 
 SideOption = Annotated[
-    Literal["designed", "front", "back", "either"],
+    Side,
     typer.Option(
         "--side", help="Side of the pattern that the camera sees; designed: as stated in the layout."
     ),
 ]
 
 PresetOption = Annotated[
-    Literal["balanced", "accurate"],
+    Preset,
     typer.Option("--preset", help="Speed or accuracy of the positions; the ids are the same."),
 ]
 
-FramesOption = Annotated[int | None, typer.Option("--frames", min=1, help="Stop after this many frames.")]
+LayoutArgument = Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")]
 
 SourcesArgument = Annotated[
     list[str],
     typer.Argument(
         metavar="SOURCE",
         help='Pictures, folders, patterns such as "run*/*.png", a video, a camera\'s number, or rtsp://...',
-    ),
-]
-
-TimesOption = Annotated[
-    str | None,
-    typer.Option(
-        "--times",
-        metavar="names|index|FILE",
-        help="Times of the frames: the names' numbers, the count, or a .csv of FRAME,SECONDS. [default: what the names "
-        "say; a video's own]",
     ),
 ]

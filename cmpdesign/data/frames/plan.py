@@ -21,6 +21,7 @@ from cmpdesign.files.layout_json import layout_to_json, pattern_digest
 from cmpdesign.inputs.documents import read_toml
 from cmpdesign.inputs.files import MOST_DATA_BYTES, read_file
 from cmpdesign.inputs.names import Line, Name
+from cmpdesign.inputs.options import Preset
 from cmpdesign.inputs.validation import validation_message
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
@@ -58,7 +59,7 @@ class MarkersTable(_Table):
     """[markers]: the reading of the markers from the encoded picture."""
 
     read: bool = True
-    preset: Literal["balanced", "accurate"] = "balanced"
+    preset: Preset = "balanced"
 
 
 class PlanTable(_Table):

@@ -172,7 +172,8 @@ class SimulatedSensor:
             Pinhole(
                 focal_px=(view.focal_px[0], view.focal_px[1]),
                 centre_px=(view.centre_px[0], view.centre_px[1]),
-                distortion=(*view.distortion,),  # type: ignore[arg-type]
+                distortion=view.distortion,
+                lens=view.lens,
                 R_camera_from_layout=view.R_camera_from_layout,
                 t_camera_from_layout_mm=view.t_camera_from_layout_mm,
                 area_px=view.area_px,

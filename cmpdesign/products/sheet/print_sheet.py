@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.design.design import Design
-from cmpdesign.design.sheet_options import PAGES_MM, SheetOptions
+from cmpdesign.design.sheet_options import SheetOptions, page_size_mm
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.outline import corner_offsets
@@ -26,6 +26,7 @@ from cmpdesign.products.sheet.page import (
     page_to_svg,
     rectangle_points,
 )
+from cmpdesign.products.sheet.ruler import RULER_MM, ruler_items
 
 FOLDER = "print"
 INK, PAPER = "#000000", "#ffffff"
@@ -97,7 +98,7 @@ def print_side(design: Design) -> PrintSide:
 
 def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
     """The page, and the number of pads on the page."""
-    width, height = PAGES_MM[design.sheet.page]
+    width, height = page_size_mm(design.sheet.page)
     places = _pad_places(design.sheet, layout, width, height)
     # Many viewers show a transparent page black, which makes the code unreadable.
     items: list[FilledPolygons | TextLine] = [
@@ -112,6 +113,8 @@ def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
     )
     items += _key_items(layout, height, print_side(design).text)
     items += _color_patch_items(layout, width, height)
+    if design.sheet.ruler:
+        items += ruler_items(MARGIN_MM + KEY_LEFT_MM, height - MARGIN_MM - KEY_BOTTOM_MM, width - MARGIN_MM)
     title = f"{layout.parameters.get('name') or layout.pattern}, print sheet"
     return Page(width, height, title, items), len(places)
 
@@ -124,7 +127,7 @@ def _pad_places(option: SheetOptions, layout: Layout, width: float, height: floa
     )
     margin = np.maximum(low - printed.min(axis=0), printed.max(axis=0) - high)
     spacing = np.array(layout.size_mm) + 2 * margin
-    left, bottom = MARGIN_MM + KEY_LEFT_MM, MARGIN_MM + KEY_BOTTOM_MM
+    left, bottom = MARGIN_MM + KEY_LEFT_MM, MARGIN_MM + KEY_BOTTOM_MM + RULER_MM * option.ruler
     usable = np.array([width - left - MARGIN_MM, height - MARGIN_MM - bottom])
     columns, rows = (int(n) for n in np.floor(usable / spacing + 1e-9))
     if columns < 1 or rows < 1:
@@ -251,7 +254,9 @@ def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPoly
         name,
         f"{layout.pattern}, {key.layers} layers, pitch {key.pitch_mm:.6g} mm, "
         f"{pad_width:.4g} x {pad_height:.4g} mm",
-        f"digest {layout.digest[:32]}",
+        f"digest {layout.digest[:32]}"
+        if layout.code is None
+        else f"code {layout.code.id}, digest {layout.digest[:32]}",
         f"{layout.digest[32:]}",
         f"print at 100 %, not fitted to the page; {side_text}",
     )

@@ -1,4 +1,4 @@
-"""A pinhole camera with any pose and OpenCV's lens distortion. Several pinholes may share one image.
+"""A camera with any pose and one of OpenCV's lenses. Several pinholes may share one image.
 
     x_camera = R_camera_from_layout @ x_layout + t_camera_from_layout_mm
 
@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.scene.camera.lens import COUNTS, LensKind, distort, reach_of
 from cmpdesign.scene.camera.medium import Medium, WindowPlane, points_on_window, window_at_rest
 from cmpdesign.scene.errors import SceneError
 
@@ -58,23 +59,25 @@ class Pinhole:
     Attributes:
         focal_px: fx, fy.
         centre_px: the principal point cx, cy in the whole image's frame.
-        distortion: OpenCV's k1, k2, p1, p2, k3, on normalised coordinates.
+        distortion: the lens' coefficients in OpenCV's order, see ``lens``.
         R_camera_from_layout: (3, 3) float64, orthogonal; det -1 with a mirror between pattern and camera.
         t_camera_from_layout_mm: (3,) float64.
         area_px: x, y, width, height of the image's part that this view fills; None: the whole image.
         name: the view's name in messages.
         window: the window's outer face in the camera's frame, where the scene has a medium; None: parallel to the
             pattern at rest, behind the medium's gel.
+        lens: the model of the lens.
     """
 
     focal_px: tuple[float, float]
     centre_px: tuple[float, float]
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
     R_camera_from_layout: Points = field(default_factory=_front_rotation)
     t_camera_from_layout_mm: Points = field(default_factory=lambda: np.array([0.0, 0.0, 50.0]))
     area_px: Area | None = None
     name: str = ""
     window: WindowPlane | None = None
+    lens: LensKind = "perspective"
 
     def __post_init__(self) -> None:
         r = _frozen_array(self.R_camera_from_layout, (3, 3), "R_camera_from_layout")
@@ -85,6 +88,11 @@ class Pinhole:
             raise SceneError(f"focal_px is {tuple(self.focal_px)}; both must be above 0 px")
         if not np.isfinite([*self.focal_px, *self.centre_px, *self.distortion]).all():
             raise SceneError("focal_px, centre_px and distortion must be finite numbers")
+        if len(self.distortion) not in COUNTS[self.lens]:
+            raise SceneError(
+                f"distortion has {len(self.distortion)} numbers; a {self.lens} lens has "
+                f"{' or '.join(map(str, COUNTS[self.lens]))}"
+            )
         error = float(np.abs(r @ r.T - np.eye(3)).max())
         if error > ORTHOGONAL:
             raise SceneError(
@@ -129,7 +137,7 @@ class Pinhole:
         Raises:
             SceneError: the layout's origin has no depth before the camera.
         """
-        if any(self.distortion):
+        if any(self.distortion) or self.lens != "perspective":
             return None
         h = self.intrinsics @ np.column_stack(
             [self.R_camera_from_layout[:, :2], self.t_camera_from_layout_mm]
@@ -142,16 +150,8 @@ class Pinhole:
 
     @cached_property
     def reach(self) -> float:
-        """The normalised radius up to which the distorted radius r (1 + k1 r^2 + k2 r^4 + k3 r^6) grows with r.
-
-        It is inf where the distorted radius always grows.
-        """
-        k1, k2, _, _, k3 = self.distortion
-        # Solved for 1 / r^2, so that weak coefficients do not overflow.
-        inverse_squares = np.roots([1.0, 3 * k1, 5 * k2, 7 * k3])
-        real = inverse_squares.real[np.abs(inverse_squares.imag) <= 1e-9 * np.abs(inverse_squares)]
-        largest = float(real.max(initial=0.0))
-        return float(1 / np.sqrt(largest)) if largest > 1e-12 else np.inf
+        """The normalised radius before the lens, up to which the radius after the lens grows; inf: always."""
+        return reach_of(self.lens, self.distortion)
 
     def reflected(self, point_mm: Sequence[float], normal: Sequence[float]) -> Pinhole:
         """This camera behind a plane mirror: it sees the pattern's reflection.
@@ -181,7 +181,8 @@ class Pinhole:
         *,
         distance_mm: float,
         field_of_view_deg: float,
-        distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0),
+        distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0),
+        lens: LensKind = "perspective",
         area_px: Area | None = None,
         name: str = "",
         **direction: Any,
@@ -192,7 +193,7 @@ class Pinhole:
             size: the image's (width, height) px.
             distance_mm: distance from the camera's centre to the target.
             field_of_view_deg: angle across the area's width, without distortion.
-            distortion, area_px, name: see ``Pinhole``.
+            distortion, lens, area_px, name: see ``Pinhole``.
             direction: the fields of ``ViewDirection``, by keyword: ``tilt_deg``, ``azimuth_deg``, ``roll_deg``,
                 ``target_mm``, ``back``, ``mirror``.
 
@@ -217,7 +218,7 @@ class Pinhole:
             flip = np.diag([-1.0, 1.0, 1.0])
             r, t = flip @ r, flip @ t
         centre_px = (x + (width - 1) / 2, y + (height - 1) / 2)
-        return cls((focal_px, focal_px), centre_px, distortion, r, t, area_px, name)
+        return cls((focal_px, focal_px), centre_px, distortion, r, t, area_px, name, lens=lens)
 
 
 def _looking_rotation(view: ViewDirection) -> Points:
@@ -272,7 +273,7 @@ def project_3d(camera: Pinhole, xyz_mm: Points, medium: Medium | None = None) ->
             f"{depth[worst]:.3g} mm, it must be above 0 mm; move the camera away or tilt it less"
         )
     xy = xyz_camera[:, :2] / depth[:, None]
-    if any(camera.distortion):
+    if any(camera.distortion) or camera.lens != "perspective":
         xy = distort_points(camera, xy)
     return np.asarray(xy * np.asarray(camera.focal_px) + np.asarray(camera.centre_px))
 
@@ -283,24 +284,19 @@ def depth_mm(camera: Pinhole, xyz_mm: Points) -> Points:
 
 
 def distort_points(camera: Pinhole, xy: Points) -> Points:
-    """Normalised coordinates (N, 2) after the lens (OpenCV's model with k1, k2, p1, p2, k3).
+    """Normalised coordinates (N, 2) after the lens, of coordinates (N, 2) before it.
 
     Raises:
         SceneError: a point lies beyond ``Pinhole.reach``.
     """
-    k1, k2, p1, p2, k3 = camera.distortion
-    x, y = xy[:, 0], xy[:, 1]
-    r2 = x * x + y * y
-    if r2.max(initial=0.0) >= camera.reach**2:
+    radius = np.hypot(*xy.T).max(initial=0.0)
+    if radius >= camera.reach:
         raise SceneError(
-            f"{_camera_label(camera)}the pattern reaches {np.sqrt(r2.max()):.3g} focal lengths from the "
+            f"{_camera_label(camera)}the pattern reaches {radius:.3g} focal lengths from the "
             f"optical axis, but the "
             f"distortion turns back on itself at {camera.reach:.3g}; take a weaker distortion or move the camera away"
         )
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return np.stack([u, v], axis=-1)
+    return distort(camera.lens, camera.distortion, xy)
 
 
 def _camera_label(camera: Pinhole) -> str:

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from cmpdesign.inputs.names import nearest_name
 from cmpdesign.inputs.validation import shown_value
+from cmpdesign.scene.camera.lens import LensKind
 from cmpdesign.scene.camera.medium import Medium, WindowPlane
 from cmpdesign.scene.camera.pinhole import Pinhole
 from cmpdesign.scene.camera.plain import Camera
@@ -61,7 +62,8 @@ class ViewTable(Table):
 
     name: str = ""
     area_px: tuple[int, int, int, int] | None = None
-    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    lens: LensKind = "perspective"
+    distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
     mirrored: bool | None = None
     focal_px: tuple[float, float] | None = None
     centre_px: tuple[float, float] | None = None
@@ -116,6 +118,7 @@ class ViewTable(Table):
                 self.area_px,
                 self.name,
                 window,
+                self.lens,
             )
             reflects = bool(np.linalg.det(camera.R_camera_from_layout) < 0)
             if self.mirrored is not None and self.mirrored != reflects:
@@ -124,7 +127,9 @@ class ViewTable(Table):
                     f"{-1 if reflects else 1}; it is -1 where an odd number of mirrors stands between, leave one out"
                 )
             return camera
-        looking = {name: getattr(self, name) for name in (*LOOKING_KEYS, "distortion", "area_px", "name")}
+        looking = {
+            name: getattr(self, name) for name in (*LOOKING_KEYS, "distortion", "lens", "area_px", "name")
+        }
         return replace(Pinhole.looking(size, mirror=bool(self.mirrored), **looking), window=window)
 
 

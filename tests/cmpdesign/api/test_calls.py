@@ -28,6 +28,7 @@ CALLS = {
     "build": "load",
     "check": "load",
     "evaluate": "run_experiment",
+    "calibrate camera": "calibrate_camera",
     "calibrate pattern": "calibrate_pattern",
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
@@ -259,9 +260,11 @@ def test_track_writes_what_the_command_writes(design: cmpdesign.Design, tmp_path
     a, b = (cmpdesign.load_run(tmp_path / name) for name in ("a.npz", "b.npz"))
     assert np.array_equal(a.arrays["displacement_mm"], b.arrays["displacement_mm"], equal_nan=True)
     assert len(b) == len(seen) == 3 and set(followed.written) == {
-        tmp_path / name for name in ("b.npz", "b.npz.summary.json", "q.png")
+        str(tmp_path / name) for name in ("b.npz", "b.npz.summary.json", "q.png")
     }
-    assert followed.summary["frames"]["tracked"] == 3 and followed.ended_early == ""
+    assert followed.frames.tracked == 3 and followed.ended_early is None
+    stated = json.loads((tmp_path / "b.npz.summary.json").read_text())
+    assert json.loads(followed.to_json()) == {**stated, "live": None, "written": list(followed.written)}
     tracked = [
         Tracker(design.layout).track(frame.image)
         for frame in cmpdesign.open_source(tmp_path / "frames").frames()

@@ -29,6 +29,7 @@ from cmpdesign.scene import (
     render,
     standard_layout,
 )
+from cmpdesign.scene.camera.lens import LensKind
 from cmpdesign.scene.camera.pinhole import distort_points, project_3d
 from cmpdesign.scene.camera.plain import camera_homography, to_pinhole
 from cmpdesign.scene.drawing.view import single_view
@@ -74,6 +75,24 @@ def test_projection_is_opencvs(distortion: list[float], places: list[float]) -> 
         xyz, turn, camera.t_camera_from_layout_mm, camera.intrinsics, np.array(distortion)
     )
     np.testing.assert_allclose(project_3d(camera, xyz), expected[:, 0], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("lens", "distortion"),
+    [
+        ("perspective", (0.3, 0.1, 0.001, -0.002, 0.01, 0.7, 0.2, 0.02)),
+        ("perspective", (0.3, 0.1, 0.001, -0.002, 0.01, 0.7, 0.2, 0.02, 0.002, -0.001, 0.003, 0.001)),
+        ("fisheye", (0.02, -0.01, 0.003, -0.001)),
+    ],
+)
+def test_wide_lenses_are_opencvs(lens: LensKind, distortion: tuple[float, ...]) -> None:
+    camera = steep(distortion=distortion, lens=lens)
+    xyz = np.random.default_rng(5).uniform(-6, 6, (200, 3))
+    turn, _ = cv2.Rodrigues(camera.R_camera_from_layout)
+    project = cv2.fisheye.projectPoints if lens == "fisheye" else cv2.projectPoints
+    shift = camera.t_camera_from_layout_mm[:, None]
+    expected = project(xyz[:, None], turn, shift, camera.intrinsics, np.array(distortion))[0]
+    np.testing.assert_allclose(project_3d(camera, xyz), expected[:, 0], atol=1e-9)
 
 
 def test_a_view_without_distortion_is_its_homography(layout: Layout) -> None:

@@ -444,3 +444,56 @@ def test_a_wrong_pad_as_made_is_one_clear_line(changes: dict[str, Any], message:
     document = made_document()
     document["as_made"] |= changes
     assert re.search(message, refused(json.dumps(document)))
+
+
+def coded_document() -> dict[str, Any]:
+    layout = build_layout(load_design("honeycomb", {"layers": 4, "code": 3}))
+    document: dict[str, Any] = json.loads(layout_to_json(layout))
+    return document
+
+
+def white_ink(document: dict[str, Any]) -> None:
+    document["cells"]["color"][document["cells"]["color"].index("green")] = "white"
+
+
+def plain_colors(document: dict[str, Any]) -> None:
+    cell, colors = document["reference"]["cell"], document["cells"]["color"]
+    for i, color in enumerate(colors):
+        if color == "white" and i != cell:
+            colors[i] = "black"
+
+
+def test_a_coded_pad_is_version_2() -> None:
+    """A coded pad is written as it is read; a plain pad stays version 1."""
+    document = coded_document()
+    VALIDATOR.validate(document)
+    assert document["version"] == 2 and document["code"] == {"id": 3, "share": 0.12}
+    reference = parse_layout(json.dumps(document))
+    assert reference.code is not None and (reference.code.id, reference.code.share) == (3, 0.12)
+    assert (reference.cell_color == 4).sum() == 6
+    assert json.loads(layout_to_json(layout_from_reference(reference))) == document
+    plain = json.loads(layout_to_json(build_layout(load_design("honeycomb", {"layers": 4}))))
+    assert plain["version"] == 1 and "code" not in plain
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (put("version", to=1), "code is given in a file of version 1; expected version 2"),
+        (put("code", to=3), "code is 3; expected an object"),
+        (put("code", "id", to=0), "code.id is 0; expected an integer from 1 to 255"),
+        (put("code", "id", to=256), "code.id is 256; expected an integer from 1 to 255"),
+        (put("code", "id", to=True), "code.id is true; expected an integer"),
+        (put("code", "share", to=1.0), "code.share is 1.0; expected a number between 0 and 1"),
+        (put("code", "share", to="12%"), "code.share is '12%'; expected a number between 0 and 1"),
+        (drop("code", "share"), "code.share is missing"),
+        (put("code", "name", to="a"), "code.name|'name' is unknown"),
+        (drop("code"), "reference.cell is .*; expected the only white cell"),
+        (plain_colors, "reference.cell is .*; expected one of several white cells of a code"),
+        (white_ink, r"cells.color\[.*\] is white; expected the ink of its place"),
+    ],
+)  # fmt: skip
+def test_a_wrong_code_is_one_clear_line(damage: Damage, message: str) -> None:
+    document = coded_document()
+    damage(document)
+    assert re.search(message, refused(json.dumps(document)))

@@ -9,8 +9,8 @@ import pytest
 
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import AsMade, Layout
-from cmpdesign.scene import Camera, render, standard_layout, standard_scene
-from extractor import Extractor, Markers, Status, parse_layout
+from cmpdesign.scene import Camera, Press, composed, render, standard_layout, standard_scene
+from extractor import Extractor, Markers, Status, Tracker, parse_layout
 
 CAMERAS = tuple(
     Camera(28.0, rotation_deg=turn, tilt_deg=tilt, tilt_axis_deg=2 * turn, focal_px=focal)
@@ -58,3 +58,17 @@ def test_a_flat_pad_is_read_as_before() -> None:
     flat, designed = read(layout, image), read(replace(layout, as_made=None), image)
     for name in ("xy_px", "cov_px2", "status", "virtual_xy_px", "virtual_cov_px2"):
         np.testing.assert_array_equal(getattr(flat, name), getattr(designed, name))
+
+
+def test_a_tracker_keeps_the_parallax_of_its_first_picture() -> None:
+    """A contact changes the apparent sizes of cells; displacements are as good as without the height."""
+    scene = replace(standard_scene(made(-0.15)), camera=CAMERAS[2])
+    pressed = replace(scene, surface=composed(Press(radius_mm=3.0, depth_mm=0.4)), seed=1)
+    shots = [render(each) for each in (scene, replace(scene, seed=2), pressed)]
+    moved = shots[2].truth.marker_xy_px - shots[0].truth.marker_xy_px
+    errors = {}
+    for height_mm in (-0.15, 0.0):
+        tracker = Tracker(parse_layout(layout_to_json(made(height_mm))))
+        rest, _, contact = (tracker.track(shot.image).markers.xy_px for shot in shots)
+        errors[height_mm] = float(np.sqrt(np.nanmean((contact - rest - moved) ** 2)))
+    assert errors[-0.15] < 1.1 * errors[0.0]

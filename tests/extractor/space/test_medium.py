@@ -102,7 +102,7 @@ def test_near_the_normal_depth_shrinks_by_the_index() -> None:
 @pytest.mark.parametrize(("view", "slab"), VIEWS)
 def test_derivatives_are_those_of_the_projection(view: View, slab: Slab) -> None:
     xyz = np.concatenate([TRUE, np.zeros((1, 3))])
-    _, by_point, by_pose = view.linearised(xyz)
+    _, _, by_point, by_pose = view.linearised(xyz)
     rotation, shift = view.R_camera_from_layout, view.t_camera_from_layout_mm
     step = 1e-5
     for k in range(3):

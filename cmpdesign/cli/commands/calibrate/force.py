@@ -31,8 +31,8 @@ def force(
 
     Thickness and marker depth are not fitted: an error of them is part of the modulus.
     """
-    from cmpdesign.api.workshop import calibrate_force
-    from cmpdesign.cli.documents.reading import CalibrateForceDocument
+    from cmpdesign.api.force import calibrate_force
+    from cmpdesign.documents.reading import CalibrateForceDocument
 
     with working("reading the run"):
         found = calibrate_force(run, weights)

@@ -34,8 +34,8 @@ def gel(
 
     The file depends on thickness, Poisson's ratio and marker depth, not on Young's modulus.
     """
-    from cmpdesign.api.workshop import calibrate_gel
-    from cmpdesign.cli.documents.reading import CalibrateGelDocument
+    from cmpdesign.api.force import calibrate_gel
+    from cmpdesign.documents.reading import CalibrateGelDocument
 
     require_suffix("--output", output, [".npz"])
     with working("solving the block"):

@@ -50,7 +50,7 @@ def pattern(
 ) -> None:
     """Measure the places of one pad's markers. Read the pad's pictures with the written layout."""
     from cmpdesign.api.workshop import calibrate_pattern
-    from cmpdesign.cli.documents.reading import CalibratePatternDocument
+    from cmpdesign.documents.reading import CalibratePatternDocument
     from cmpdesign.watch import watched
 
     require_suffix("--output", output, [".json"])

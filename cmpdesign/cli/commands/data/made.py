@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def print_made(folder: Path, made: Progress) -> None:
     """Print the contents of the data set, and end the command."""
-    from cmpdesign.cli.documents.data import DatasetDocument
+    from cmpdesign.documents.data import DatasetDocument
 
     share = "" if made.shards == made.of_shards else f" of {made.of_shards}"
     redrawn = f", {made.redrawn} draws could not be rendered and were drawn anew" if made.redrawn else ""

@@ -35,7 +35,7 @@ def lerobot(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Write a data set that LeRobot loads: displacement, position and status of every marker, and images if given."""
-    from cmpdesign.cli.documents.runs import ExportDocument
+    from cmpdesign.documents.runs import ExportDocument
     from cmpdesign.tracking.export.lerobot import DataSet, write_lerobot
     from cmpdesign.tracking.export.runs import frames_per_second, require_one_kind, tidy_fps
     from cmpdesign.watch import watched

@@ -29,7 +29,7 @@ def zarr(
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
     """Write a replay buffer: data/tactile_* with the frames of all runs, and meta/episode_ends."""
-    from cmpdesign.cli.documents.runs import ExportDocument
+    from cmpdesign.documents.runs import ExportDocument
     from cmpdesign.tracking.export.zarr_buffer import write_zarr
     from cmpdesign.watch import watched
 

@@ -34,9 +34,9 @@ def init(
 
     The file holds every field with its meaning, unit, range and default. The command build takes the file.
     """
-    from cmpdesign.cli.documents.designs import InitDocument
     from cmpdesign.design.commented_toml import commented_toml
     from cmpdesign.design.extends import require_extended
+    from cmpdesign.documents.designs import InitDocument
     from cmpdesign.errors import CmpDesignError
     from cmpdesign.files.atomic import write_file
     from cmpdesign.inputs.files import path_exists

@@ -29,6 +29,6 @@ def schema(
 
         print_document(design_schema_text())
         return
-    from cmpdesign.cli.documents.registry import document_schema_text
+    from cmpdesign.documents.registry import document_schema_text
 
     print_document(document_schema_text(" ".join(command)))

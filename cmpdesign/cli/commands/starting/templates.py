@@ -9,7 +9,7 @@ import typer
 from cmpdesign.cli.terminal import finish, print_document, say
 
 if TYPE_CHECKING:
-    from cmpdesign.cli.documents.designs import TemplatesDocument
+    from cmpdesign.documents.designs import TemplatesDocument
 
 EXAMPLES = ("cmpdesign templates --kind scenes", "cmpdesign templates --show tac3d")
 Kind = Literal["designs", "scenes", "plans", "machines", "materials", "silicones", "sensors"]
@@ -89,15 +89,15 @@ def _list_templates(kind: Kind | None) -> None:
 
 
 def _list_document(rows: list[_Row]) -> TemplatesDocument:
-    from cmpdesign.cli.documents.designs import TemplatePart, TemplatesDocument
+    from cmpdesign.documents.designs import TemplatePart, TemplatesDocument
 
     return TemplatesDocument(templates=tuple(TemplatePart(**row._asdict()) for row in rows))
 
 
 def _show_template(name: str) -> None:
-    from cmpdesign.cli.documents.designs import TemplateDocument
     from cmpdesign.cli.mode import current_mode
     from cmpdesign.design.templates import find_template
+    from cmpdesign.documents.designs import TemplateDocument
     from cmpdesign.inputs.files import read_text
 
     kind, path = find_template(name)

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from cmpdesign.cli.documents.document import Document, Part
+from cmpdesign.documents.document import Document, Part
 
 
 class QualityPart(Part):

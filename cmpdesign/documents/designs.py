@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
-from cmpdesign.cli.documents.document import Document, Part
-
-if TYPE_CHECKING:
-    from cmpdesign.layout.checks import Finding
-    from cmpdesign.products.as_made.reading import PadReading
+from cmpdesign.documents.document import Document, Part
 
 
 class FindingPart(Part):
@@ -120,12 +116,12 @@ class InitDocument(Document):
     extends: str | None
 
 
-def finding_parts(findings: Iterable[Finding]) -> tuple[FindingPart, ...]:
+def finding_parts(findings: Iterable[Any]) -> tuple[FindingPart, ...]:
     """The findings as parts of a document."""
     names = FindingPart.model_fields
     return tuple(FindingPart(**{name: getattr(finding, name) for name in names}) for finding in findings)
 
 
-def reading_parts(readings: Mapping[str, PadReading]) -> dict[str, PadReadingPart]:
+def reading_parts(readings: Mapping[str, Any]) -> dict[str, PadReadingPart]:
     """The readings of pads as parts of a document."""
     return {name: PadReadingPart(**reading.figures()) for name, reading in readings.items()}

@@ -8,8 +8,8 @@ from typing import Union
 
 from pydantic import TypeAdapter
 
-from cmpdesign.cli.documents import data, designs, reading, runs
-from cmpdesign.cli.documents.document import Document, Message
+from cmpdesign.documents import calibration, data, designs, reading, runs
+from cmpdesign.documents.document import Document, Message
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.names import nearest_name
 
@@ -28,6 +28,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "dataset": (data.DatasetDocument,),
     "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument,),
+    "calibrate camera": (calibration.CalibrateCameraDocument,),
     "calibrate force": (reading.CalibrateForceDocument,),
     "calibrate gel": (reading.CalibrateGelDocument,),
     "calibrate pattern": (reading.CalibratePatternDocument,),

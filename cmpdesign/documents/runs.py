@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from cmpdesign.cli.documents.document import Document, Part
-from cmpdesign.cli.documents.reading import QualityPart
+from cmpdesign.documents.document import Document, Part
+from cmpdesign.documents.reading import QualityPart
 
 
 class FramesPart(Part):

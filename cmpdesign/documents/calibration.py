@@ -1,0 +1,43 @@
+"""Documents of the commands that calibrate cameras and rigs."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from cmpdesign.documents.document import Document, Part
+
+
+class CalibrationPicturePart(Part):
+    """One picture of a calibration."""
+
+    picture: str
+    points: int = Field(description="Markers measured.")
+    rms_px: float | None = Field(description="RMS residual per axis; null for a picture that is not read.")
+    cause: str = Field(description="Why the picture is left out; empty for a picture that is used.")
+
+
+class CalibrateCameraDocument(Document):
+    """The result of ``calibrate camera``."""
+
+    format: Literal["cmp-calibration-camera"] = "cmp-calibration-camera"
+    version: Literal[1] = 1
+    written: tuple[str, ...]
+    size_px: tuple[int, int]
+    model: str
+    response: str | float = Field(
+        description="Relation of light and values with which the pictures were read."
+    )
+    parameters: dict[str, float]
+    deviations: dict[str, float] = Field(description="Standard deviations of the parameters.")
+    held: tuple[str, ...] = Field(description="Parameters that the pictures do not determine.")
+    rms_px: float = Field(description="RMS residual per axis.")
+    scale: float = Field(description="Residuals over the stated deviations of the markers; 1 is right.")
+    ray_px: float = Field(
+        description="RMS deviation of the rays over the image, per axis, after a common turn."
+    )
+    sheet_bend_mm: float = Field(description="Height of the sheet's shape; 0 for a flat sheet.")
+    further_view: str = Field(description="The view to add that would help most.")
+    further_view_ray_px: float
+    pictures: tuple[CalibrationPicturePart, ...]

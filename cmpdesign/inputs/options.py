@@ -1,0 +1,81 @@
+"""Options of calls: each is stated once, with its type, its default and how the command line writes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
+
+from cmpdesign.errors import CmpDesignError, parameter
+
+# As in the extractor, which these modules do not load; a test compares both.
+Preset = Literal["balanced", "accurate"]
+Side = Literal["designed", "front", "back", "either"]
+Channels = Literal["bgr", "rgb"]
+Response = Literal["srgb", "linear"] | float
+Options = TypeVar("Options")
+
+
+@dataclass(frozen=True)
+class Usual:
+    """The default of an option, the second part of its annotation.
+
+    Attributes:
+        value: the default.
+        metavar: what stands for the value in help texts; None: its type.
+        least: smallest value; None: none.
+        above: the value must be above this number; None: none.
+        name: name on the command line, if it differs, as "--live-wait".
+    """
+
+    value: Any
+    metavar: str | None = None
+    least: float | None = None
+    above: float | None = None
+    name: str | None = None
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option of a call: its name, its type and its ``Usual``."""
+
+    name: str
+    type: Any
+    usual: Usual
+
+
+def options_of(record: type) -> list[Option]:
+    """The options of a ``TypedDict`` whose keys are annotated with ``Usual``, in their order."""
+    hints = get_type_hints(record, include_extras=True)
+    found = []
+    for name, hint in hints.items():
+        assert get_origin(hint) is Annotated, f"{record.__name__}.{name} has no default"
+        kind, usual = get_args(hint)
+        found.append(Option(name, kind, usual))
+    return found
+
+
+def settled(record: type[Options], given: Mapping[str, Any]) -> Options:
+    """All options: the given values, and the defaults of the others.
+
+    Raises:
+        TypeError: a name that the record does not have.
+        CmpDesignError: a number that is too small or not finite.
+    """
+    known = {option.name: option for option in options_of(record)}
+    for name in given:
+        if name not in known:
+            raise TypeError(f"{name} is no option; there are {', '.join(known)}")
+    values = {name: given.get(name, option.usual.value) for name, option in known.items()}
+    for name, value in values.items():
+        _require_within(name, value, known[name].usual)
+    return cast(Options, values)
+
+
+def _require_within(name: str, value: Any, usual: Usual) -> None:
+    if value is None:
+        return
+    if usual.above is not None and not usual.above < value < float("inf"):
+        raise CmpDesignError(f"{parameter(name)} is {value:g}; expected a number above {usual.above:g}")
+    if usual.least is not None and not usual.least <= value < float("inf"):
+        raise CmpDesignError(f"{parameter(name)} is {value:g}; expected a number from {usual.least:g}")

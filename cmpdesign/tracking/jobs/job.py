@@ -1,0 +1,313 @@
+"""The work of ``track`` and ``reconstruct``: a source followed to its end, its files and its summary."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from cmpdesign.documents.document import Document
+from cmpdesign.documents.runs import ReconstructDocument, TrackDocument
+from cmpdesign.errors import CmpDesignError, OutputError, parameter
+from cmpdesign.inputs.texts import visible
+from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions, TrackOptions
+from cmpdesign.tracking.live.options import Live
+from cmpdesign.tracking.recording.options import Recording
+
+if TYPE_CHECKING:
+    from cmpdesign.contact.continuation import SurfaceContinuation
+    from cmpdesign.contact.elastomer import Elastomer
+    from cmpdesign.tracking.run import TrackingRun
+    from extractor import Reference
+    from extractor.contact import ContactReader
+
+Summary = TypeVar("Summary", bound=Document, covariant=True)
+
+
+class Job(Protocol[Summary]):
+    """A sequence to follow: the run is prepared, and its end is summed up."""
+
+    @property
+    def output(self) -> Path: ...
+
+    @property
+    def overlay(self) -> Path | None: ...
+
+    def prepare(self) -> TrackingRun: ...
+
+    def summary(self, run: TrackingRun) -> dict[str, Any]: ...
+
+    def pictures(self, run: TrackingRun) -> dict[Path, bytes]: ...
+
+    def document(self, fields: dict[str, Any]) -> Summary: ...
+
+
+def recording_of(options: SequenceOptions) -> Recording:
+    """The options of a recording.
+
+    Raises:
+        CmpDesignError: a frame id that no topic can have.
+    """
+    return Recording(options["frame_id"], options["with_images"])
+
+
+def viewer_of(options: SequenceOptions) -> Live | None:
+    """The live server's options, if a server is wanted.
+
+    Raises:
+        CmpDesignError: a server that cannot be, or options of a server without one.
+    """
+    kind, port, wait_s = options["live"], options["live_port"], options["live_wait_s"]
+    if kind is not None:
+        return Live(kind, port, wait_s)
+    if port is not None or wait_s:
+        names = f"{parameter('live_port')} and {parameter('live_wait_s')}"
+        raise CmpDesignError(f"{names} need {parameter('live')}")
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class TrackJob:
+    """The inputs of ``track``, with all options."""
+
+    layout: Reference
+    source: tuple[str, ...]
+    output: Path
+    options: TrackOptions
+
+    @property
+    def overlay(self) -> Path | None:
+        """The video to draw, if any."""
+        return _path(self.options["overlay"])
+
+    def prepare(self) -> TrackingRun:
+        """The run; all checks of the input are made here, before a file is written."""
+        from cmpdesign.tracking.live.outputs import open_outputs
+        from cmpdesign.tracking.overlay import OverlayWriter
+        from cmpdesign.tracking.run import TrackingRun, read_rest_markers
+        from cmpdesign.tracking.sources import DEFAULT_FPS, open_source
+        from cmpdesign.tracking.summary import TrackStatistics
+        from cmpdesign.tracking.table import TrackTable
+        from extractor import Tracker
+
+        how, source = self.options, self.source
+        quiver, viewer = _path(how["quiver"]), viewer_of(how)
+        if quiver is not None and quiver.suffix.lower() != ".png":
+            raise CmpDesignError(f"{parameter('quiver')} {quiver}: unknown ending; expected .png")
+        new_tracker = partial(
+            Tracker,
+            self.layout,
+            warm=not how["cold"],
+            preset=how["preset"],
+            response=how["response"],
+            side=how["side"],
+            channels=how["channels"],
+        )
+        at_rest, rest = None, how["rest"]
+        if rest is not None:
+            at_rest = read_rest_markers(str(rest), source, how["fps"], new_tracker(), how["max_pixels"])
+        tracker = new_tracker(rest=at_rest, mm_per_px=how["mm_per_px"])
+        frames = open_source(source, how["fps"], how["max_pixels"], how["times"])
+        video = None
+        if self.overlay is not None:
+            video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
+        outputs = open_outputs(
+            self.output, TrackTable(tracker, lambda: frames.times), recording_of(how), viewer
+        )
+        statistics = TrackStatistics(self.layout)
+        return TrackingRun(frames, tracker, outputs.sink, statistics, video, how["frames"], live=outputs.live)
+
+    def summary(self, run: TrackingRun) -> dict[str, Any]:
+        """The JSON object of the summary."""
+        from cmpdesign.inputs.sources import without_password
+
+        statistics, source = run.statistics, ", ".join(map(without_password, self.source))
+        found: dict[str, Any] = statistics.to_json(
+            source, run.source.total, run.ended_early, run.tracker.rest
+        )
+        return found
+
+    def document(self, fields: dict[str, Any]) -> TrackDocument:
+        """The record of the run."""
+        return TrackDocument(**fields)
+
+    def pictures(self, run: TrackingRun) -> dict[Path, bytes]:
+        """The quiver plot, if a plot is wanted and a frame has a displacement."""
+        farthest, rest = run.statistics.farthest, run.tracker.rest
+        quiver = _path(self.options["quiver"])
+        if quiver is None or farthest is None or rest is None:
+            return {}
+        from cmpdesign.files.images import to_png
+        from cmpdesign.tracking.quiver import draw_quiver
+
+        return {quiver: to_png(draw_quiver(self.layout, rest, farthest))}
+
+
+@dataclass(frozen=True, eq=False)
+class ReconstructJob:
+    """The inputs of ``reconstruct``, with all options; ``rest`` and ``source`` are lists with commas for several
+    cameras.
+    """
+
+    layout: Reference
+    rig: Path
+    rest: str
+    source: str
+    output: Path
+    options: ShapeOptions
+    overlay: Path | None = None
+
+    def prepare(self) -> TrackingRun:
+        """The run; all checks of the input are made here, before a file is written."""
+        from cmpdesign.tracking.live.outputs import open_outputs
+        from cmpdesign.tracking.marker_depth import read_elastomer, read_marker_depth_mm
+        from cmpdesign.tracking.run import TrackingRun
+        from cmpdesign.tracking.shape_summary import ShapeStatistics
+        from cmpdesign.tracking.shape_table import ShapeTable
+        from cmpdesign.tracking.sources import open_sources, split_list
+        from extractor import Reconstructor, ShapeTracker, ViewExtractor, load_rig
+
+        how, viewer = self.options, viewer_of(self.options)
+        rig, depth_mm = load_rig(self.rig), read_marker_depth_mm(self.rig)
+        elastomer = read_elastomer(self.rig) if how["surface"] else None
+        if how["from_rest"]:
+            rig = rig.without_poses()
+        views = ViewExtractor(self.layout, rig, "accurate", how["response"], how["side"], how["channels"])
+        at_rest = views.extract(self._rest_image())
+        reconstructor = Reconstructor(
+            views.layout,
+            views.rig,
+            at_rest,
+            flatness_mm=(0.0, 0.0, how["flatness_mm"]),
+            model_px=how["model_px"],
+        )
+        continuation = None if elastomer is None else _continuation(elastomer, views.layout)
+        gel = _path(how["contact"])
+        contact = None if gel is None else _contact_reader(gel, self.rig, views.layout)
+        source = open_sources(self.source, how["fps"], how["max_pixels"], how["times"])
+        is_one_a_view = len(split_list(self.source)) > 1
+        recording = replace(recording_of(how), views=rig.views, is_image_one_a_view=is_one_a_view)
+        outputs = open_outputs(
+            self.output,
+            ShapeTable(reconstructor, continuation, lambda: source.times, contact),
+            recording,
+            viewer,
+        )
+        tracker = ShapeTracker(
+            reconstructor,
+            warm=not how["cold"],
+            preset=how["preset"],
+            response=how["response"],
+            channels=how["channels"],
+        )
+        statistics = ShapeStatistics(reconstructor, depth_mm, how["surface"])
+        return TrackingRun(
+            source,
+            tracker,
+            outputs.sink,
+            statistics,
+            limit=how["frames"],
+            warnings=reconstructor.warnings,
+            live=outputs.live,
+        )
+
+    def summary(self, run: TrackingRun) -> dict[str, Any]:
+        """The JSON object of the summary."""
+        from cmpdesign.inputs.sources import without_password
+
+        source = without_password(self.source)
+        found: dict[str, Any] = run.statistics.to_json(source, run.source.total, run.ended_early)
+        return found
+
+    def document(self, fields: dict[str, Any]) -> ReconstructDocument:
+        """The record of the run."""
+        return ReconstructDocument(**fields)
+
+    def pictures(self, run: TrackingRun) -> dict[Path, bytes]:
+        """None."""
+        return {}
+
+    def _rest_image(self) -> Any:
+        """The image at rest; of several sources a list with one image for each view."""
+        from cmpdesign.tracking.run import read_rest_image
+        from cmpdesign.tracking.sources import split_list
+
+        sources, rests = split_list(self.source), split_list(self.rest)
+        if len(rests) == 1:
+            rests = rests * len(sources)
+        if len(rests) != len(sources):
+            raise CmpDesignError(
+                f"{parameter('rest')} lists {len(rests)} pictures, {parameter('source')} {len(sources)}; "
+                "give the same number of both"
+            )
+        images = [
+            read_rest_image(rest, name, self.options["fps"], self.options["max_pixels"])
+            for rest, name in zip(rests, sources, strict=True)
+        ]
+        return images if len(images) > 1 else images[0]
+
+
+def follow(job: Job[Summary], watch: Callable[[Any], None]) -> Summary:
+    """Follow a source to its end and write the summary; after a failure the summary covers the frames so far.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    run = job.prepare()
+    try:
+        run.go(watch)
+    except OutputError:
+        with suppress(OutputError):
+            write_summary(run, job)
+        raise
+    return write_summary(run, job)
+
+
+def write_summary(run: TrackingRun, job: Job[Summary]) -> Summary:
+    """Write the summary beside the table of a run that has ended, and the quiver plot.
+
+    Raises:
+        CmpDesignError: no frame was read; no summary is written.
+        OutputError: a file cannot be written.
+    """
+    from cmpdesign.files.atomic import write_file
+
+    if not run.statistics.frames:
+        raise CmpDesignError(f"{run.source.name}: no frame could be read")
+    summary = job.summary(run)
+    summary["times"] = run.source.times.to_json()
+    if run.live is not None:
+        summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
+    # Tables of several formats in one folder have a summary each.
+    place = job.output.with_name(job.output.name + ".summary.json")
+    contents: dict[Path, str | bytes] = {place: json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
+    contents |= job.pictures(run)
+    for path, content in contents.items():
+        write_file(path, content)
+    written = (job.output, *contents, *([] if job.overlay is None else [job.overlay]))
+    return job.document({**summary, "written": tuple(visible(str(path)) for path in written)})
+
+
+def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuation:
+    import numpy as np
+
+    from cmpdesign.contact.continuation import SurfaceContinuation
+
+    edges_mm = np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0]
+    return SurfaceContinuation(elastomer, layout.xy_mm, float(np.median(np.hypot(*edges_mm.T))))
+
+
+def _contact_reader(gel: Path, rig: Path, layout: Reference) -> ContactReader:
+    from cmpdesign.tracking.marker_depth import read_young_mpa
+    from extractor.contact import ContactReader, load_gel
+
+    young_mpa, sigma_mpa = read_young_mpa(rig)
+    return ContactReader(layout, load_gel(gel), young_mpa, young_sigma_mpa=sigma_mpa)
+
+
+def _path(given: str | Path | None) -> Path | None:
+    return None if given is None else Path(given)

@@ -1,0 +1,96 @@
+"""Commands that derive from calls: the same options, defaults and words, stated once."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Annotated, Any, TypedDict, Unpack, get_args
+
+import pytest
+import typer
+from typer.main import get_command
+
+import cmpdesign
+from cmpdesign.cli import app
+from cmpdesign.cli.derived import derived
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs import options
+from cmpdesign.inputs.options import Usual, options_of, settled
+from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions, TrackOptions
+from extractor.image import input as images
+from extractor.pipeline import Side
+from extractor.presets import PRESETS
+
+
+def test_the_choices_are_the_extractors() -> None:
+    assert get_args(options.Preset) == PRESETS
+    assert get_args(options.Side) == get_args(Side)
+    assert get_args(options.Channels) == get_args(images.Channels)
+
+
+@pytest.mark.parametrize(("name", "record"), [("track", TrackOptions), ("reconstruct", ShapeOptions)])
+def test_a_command_has_the_options_of_its_call(name: str, record: Any) -> None:
+    command = get_command(app).commands[name]  # type: ignore[attr-defined]
+    call = getattr(cmpdesign, name)
+    parameters = inspect.signature(call).parameters.values()
+    arguments = {each.name for each in parameters if each.kind is each.POSITIONAL_OR_KEYWORD}
+    own = {"recover", "as_json", "quiet", "verbose"}
+    taken = {each.name: each for each in command.params if each.name not in own}
+    assert set(taken) == arguments | {option.name for option in options_of(record)}
+    for option in options_of(record):
+        assert taken[option.name].default == option.usual.value
+        assert taken[option.name].help[:1].strip()
+
+
+class More(TypedDict, total=False):
+    """Options of the test.
+
+    Keys:
+        width_mm: width of the strip; None: that of the pad.
+        times: how often; at least
+            once.
+    """
+
+    width_mm: Annotated[float | None, Usual(None, metavar="MM", above=0)]
+    times: Annotated[int, Usual(1, least=1, name="--repeat")]
+
+
+def strip(pad: str, **how: Unpack[More]) -> dict[str, Any]:
+    """Cut a strip, as the command ``strip`` does.
+
+    Args:
+        pad: name of the pad.
+        how: see ``More``.
+    """
+    return {"pad": pad, **settled(More, how)}
+
+
+def test_a_new_option_of_a_record_is_an_option_of_the_command() -> None:
+    seen = []
+
+    @derived(strip, More, pad=str)
+    def command(pad: str, **how: Any) -> None:
+        """More words."""
+        seen.append(strip(pad, **how))
+
+    made = typer.Typer(rich_markup_mode=None)
+    made.command()(command)
+    one = get_command(made)
+    help_text = one.get_help(typer.Context(one))
+    assert "Cut a strip.\n\n  More words." in help_text
+    assert "--repeat" in help_text and "[default: that of the pad]" in help_text
+    one.main(["wide", "--repeat", "3", "--width-mm", "2.5"], standalone_mode=False)
+    one.main(["usual"], standalone_mode=False)
+    assert seen == [
+        {"pad": "wide", "width_mm": 2.5, "times": 3},
+        {"pad": "usual", "width_mm": None, "times": 1},
+    ]
+
+
+def test_options_are_checked_for_calls_and_commands_alike() -> None:
+    with pytest.raises(CmpDesignError, match="width_mm is -1; expected a number above 0"):
+        strip("a", width_mm=-1.0)
+    with pytest.raises(CmpDesignError, match="times is 0; expected a number from 1"):
+        strip("a", times=0)
+    with pytest.raises(TypeError, match="speed is no option; there are width_mm, times"):
+        strip("a", speed=2)  # type: ignore[call-arg]
+    assert set(SequenceOptions.__annotations__) < set(TrackOptions.__annotations__)
