@@ -69,15 +69,16 @@ def calibrate_force(run: str | Path, weights: str | Path) -> ForceScale:
 
     from cmpdesign.api.sequences import load_run
     from cmpdesign.contact.force_scale import fit_force_scale, parse_weights
+    from cmpdesign.files.npz import NpzError, read_npz
     from cmpdesign.inputs.files import read_text
     from extractor.contact import ContactReason
 
     load_run(run)
-    with np.load(run, allow_pickle=False) as file:
-        if "force_n" not in file.files:
-            raise CmpDesignError(f"{run} holds no forces; write it with reconstruct --contact")
-        names = ("frame", "contact_reason", "force_n", "force_cov_n2", "young_mpa")
-        arrays = {name: file[name] for name in names}
+    names = ("frame", "contact_reason", "force_n", "force_cov_n2", "young_mpa")
+    try:
+        arrays = read_npz(run, *names)
+    except NpzError:
+        raise CmpDesignError(f"{run} holds no forces; write it with reconstruct --contact") from None
     known = parse_weights(read_text(Path(weights)), str(weights))
     missing = np.setdiff1d(known.frame, arrays["frame"])
     if len(missing):

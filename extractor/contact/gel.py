@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import zipfile
+import zlib
 from dataclasses import dataclass, field, fields
 from os import PathLike
-from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
@@ -17,12 +18,23 @@ from numpy.typing import NDArray
 
 from extractor.errors import GelError
 from extractor.layout.reference import Reference
-from extractor.layout.text_file import printable_path
+from extractor.layout.text_file import printable_path, read_bytes_file
 
 Array = NDArray[np.float64]
 FORMAT = "cmp-gel 1"
 HOW = "make the file with: cmpdesign calibrate gel LAYOUT RIG -o FILE"
 MAX_BYTES = 1 << 29
+_DAMAGE = (
+    OSError,
+    ValueError,
+    TypeError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,19 +103,18 @@ def load_gel(path: str | PathLike[str]) -> Gel:
     """
     name = printable_path(path)
     try:
-        if Path(path).stat().st_size > MAX_BYTES:
-            raise GelError(f"{name}: larger than {MAX_BYTES >> 20} MiB; {HOW}")
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            if str(file["format"]) != FORMAT:
-                raise GelError(f"{name}: format {str(file['format'])[:40]!r}, expected {FORMAT!r}; {HOW}")
-            values = {part.name: file[part.name] for part in fields(Gel)}
+        data = read_bytes_file(path, MAX_BYTES, GelError, "the file of a gel")
+    except GelError as error:
+        raise GelError(f"{error}; {HOW}") from None
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            found = str(file["format"])
+            values = {part.name: file[part.name] for part in fields(Gel)} if found == FORMAT else {}
             digest = str(file["digest"])
-    except FileNotFoundError:
-        raise GelError(f"{name}: no such file; {HOW}") from None
-    except GelError:
-        raise
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except _DAMAGE as error:
         raise GelError(f"{name}: no file of a gel ({str(error)[:80]}); {HOW}") from None
+    if not values:
+        raise GelError(f"{name}: format {found[:40]!r}, expected {FORMAT!r}; {HOW}")
     gel = Gel(**{key: _plain(value) for key, value in values.items()})
     _check(gel, digest, name)
     return gel

@@ -10,6 +10,7 @@ part outside keeps ``ERSATZ`` of the stiffness (the finite cell method, Parvizia
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,14 +27,12 @@ AXES = (
 )  # of a derivative by x, y, z: the part along the face, the part through the thickness
 
 
-def _elastic(product: Callable[[str, str], object], shear: float, lame: float) -> list[list[object]]:
+def _elastic(product: Callable[[str, str], Any], shear: float, lame: float) -> list[list[Any]]:
     """The blocks K_ij from products of derivatives."""
-    plain = sum((product(AXES[p], AXES[p]) for p in range(3)), start=0.0)  # type: ignore[call-overload]
+    plain = product("x0", "x0") + product("y0", "y0") + product("0z", "0z")
     return [
         [
-            lame * product(AXES[i], AXES[j])
-            + shear * product(AXES[j], AXES[i])
-            + (shear * plain if i == j else 0)  # type: ignore[operator]
+            lame * product(AXES[i], AXES[j]) + shear * product(AXES[j], AXES[i]) + (i == j) * shear * plain
             for j in range(3)
         ]
         for i in range(3)
@@ -59,7 +58,7 @@ def block_stiffness(
     columns = {a + b: (values[a].T @ scale @ values[b]).tocsr() for a in values for b in values}
     through = z.products()
 
-    def product(test: str, trial: str) -> object:
+    def product(test: str, trial: str) -> Any:
         return sp.kron(columns[test[0] + trial[0]], through[test[1] + trial[1]], "csr")
 
     blocks = _elastic(product, *elastic)
@@ -99,7 +98,7 @@ def wave_stiffness(
         along_x = symbols[("d" if test == "x" else "0") + ("d" if trial == "x" else "0")][1]
         return np.asarray(np.outer(along_y, along_x))
 
-    def product(test: str, trial: str) -> object:
+    def product(test: str, trial: str) -> Any:
         return column(test[0], trial[0])[..., None, None] * through[test[1] + trial[1]]
 
     blocks = np.array(_elastic(product, *elastic))  # (3, 3, ny, nx, k, k)
