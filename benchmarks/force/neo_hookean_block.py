@@ -158,8 +158,8 @@ class NeoHookeanBlock:
             before = largest
             u, p = u + share * du, p + share * dp
             if largest < TOLERANCE_MM:
+                self.last = self._contact(u, pose)  # its slip counts from the pose before
                 self.u, self.p, self.pose = u, p, pose
-                self.last = self._contact(u, pose)
                 self.stick, self.face_u = self.last.tangent, self._on_face(u)
                 return True
         return False

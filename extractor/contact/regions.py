@@ -12,9 +12,7 @@ from extractor.contact.gel import Gel
 
 Array = NDArray[np.float64]
 FINE = 4  # cells of the picture of the pressure per spacing of the loads; chosen
-TOUCHED_SHARE = (
-    0.25  # of a region's largest pressure, above which a place is touched; measured: benchmarks.force
-)
+TOUCHED_SHARE = 0.25  # of a region's largest pressure, above which a place is touched; chosen
 SADDLE_SHARE = (
     0.6  # of the smaller of two peaks, below which the pressure between them separates regions; chosen
 )

