@@ -3,21 +3,38 @@
 ``cmpdesign verify --report report.zip`` writes the report. Its pictures, layout and settings become the folder NAME in
 ``tests/extractor/reported/cases``, where ``test_reported.py`` beside that folder finds them: every picture must be
 verified. For a picture with another result, ``case.json`` states the result under "expected".
+
+A report comes from somebody else. Only checked content is written, under names that this program makes: pictures as
+``picture-1.png`` and so on, with the ending of their content.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 import zipfile
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+
+from cmpdesign.cli.terminal import error_on_one_line, printable_path
+from cmpdesign.errors import CmpDesignError
+from cmpdesign.files.atomic import write_folder
+from cmpdesign.files.image_header import open_header
+from cmpdesign.files.images import ImageFileError, decode_bytes
+from cmpdesign.inputs.files import MOST_TEXT_BYTES, open_file, require_size
+from cmpdesign.reading.problem_report import ReportDocument, parse_report
+from extractor import ExtractorError, parse_layout
 
 ROOT = Path(__file__).resolve().parents[1]
 CASES = ROOT / "tests" / "extractor" / "reported" / "cases"
-MOST_BYTES = 1 << 28  # 256 MiB: of a report's files together
-FORMAT, VERSION = "cmp-problem-report", 1
+MOST_BYTES = 1 << 28  # 256 MiB: of a report, and of its files together
+MOST_MEMBERS = 1000
+NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]{0,59}")
+# What zipfile raises on a damaged, encrypted or unknown member.
+ZIP_ERRORS = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
 class ReportError(Exception):
@@ -33,48 +50,78 @@ def adopt(report: Path, name: str | None = None, cases: Path = CASES) -> Path:
         cases: the folder of all cases.
 
     Raises:
-        ReportError: the file is no report, holds files that it does not name, or the case exists already.
+        ReportError: the file is no report, holds no picture that can be opened, or the case exists already.
     """
-    folder = cases / (name or report.stem)
-    if folder.parent != cases or folder.name.startswith("."):
-        raise ReportError(f"--name {name}: is no name of a folder")
+    name = report.stem if name is None else name
+    if not NAME.fullmatch(name):
+        raise ReportError(f"--name {name}: is no name of a folder; give up to 60 letters, digits, - and _")
+    folder = cases / name
     if folder.exists():
         raise ReportError(f"{folder} exists already; give another --name")
     try:
-        with zipfile.ZipFile(report) as bundle:
-            if sum(info.file_size for info in bundle.infolist()) > MOST_BYTES:
-                raise ReportError(f"{report}: unpacks to more than {MOST_BYTES >> 20} MiB")
-            document = json.loads(bundle.read("report.json"))
-            pictures = _named_pictures(document, report)
-            contents = {Path(file).name: bundle.read(file) for file in pictures}
-            contents["layout.json"] = bundle.read("layout.json")
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        with open_file(report) as file:
+            require_size(file, report, MOST_BYTES)
+            with zipfile.ZipFile(file) as bundle:
+                contents = _checked_contents(_Members(bundle))
+        write_folder(folder, contents)
+    except (*ZIP_ERRORS, CmpDesignError, ExtractorError, ReportError) as error:
         raise ReportError(f"{report} is no report of a problem ({error})") from None
-    case = {
-        "settings": document["settings"],
-        "versions": document["versions"],
-        "expected": {Path(file).name: {"verified": True} for file in pictures},
-    }
-    folder.mkdir(parents=True)
-    for file, content in contents.items():
-        (folder / file).write_bytes(content)
-    text = json.dumps(case, indent=2, ensure_ascii=False) + "\n"
-    (folder / "case.json").write_text(text, encoding="utf-8")
     return folder
 
 
-def _named_pictures(document: Any, report: Path) -> list[str]:
-    """The pictures' files as the report names them; each has a plain name in the folder "pictures"."""
-    if document.get("format") != FORMAT or document.get("version") != VERSION:
-        raise ReportError(f"{report}: format and version are not {FORMAT}, {VERSION}")
-    files = [str(picture["file"]) for picture in document["pictures"]]
-    for file in files:
-        name = file.removeprefix("pictures/")
-        if not name or name != Path(name).name or "\\" in name or name.startswith("."):
-            raise ReportError(f"{report}: {file!r} is no name of a picture")
-        if name in ("layout.json", "case.json"):
-            raise ReportError(f"{report}: a picture is called {name}")
-    return files
+class _Members:
+    """The files of a bundle, read up to a common limit of bytes: the sizes that the bundle states are not believed."""
+
+    def __init__(self, bundle: zipfile.ZipFile) -> None:
+        self._bundle, self._left = bundle, MOST_BYTES
+        names = bundle.namelist()
+        if len(names) > MOST_MEMBERS or len(set(names)) < len(names):
+            raise ReportError(f"holds more than {MOST_MEMBERS} files, or two files of one name")
+
+    def read(self, name: str, most_bytes: int = 1 << 62) -> bytes:
+        """The content of a file; raises ``ReportError`` without such a file, or beyond a limit."""
+        if name not in self._bundle.namelist():
+            raise ReportError(f"holds no file {name}")
+        most = min(self._left, most_bytes)
+        with self._bundle.open(name) as file:
+            data = file.read(most + 1)
+        if len(data) > most:
+            raise ReportError(f"{name} unpacks to more than {min(MOST_BYTES, most_bytes) >> 20} MiB")
+        self._left -= len(data)
+        return data
+
+
+def _checked_contents(members: _Members) -> dict[str, bytes]:
+    """The files of the case by their new names."""
+    report = parse_report(members.read("report.json", MOST_TEXT_BYTES).decode("utf-8"), "report.json")
+    layout = members.read("layout.json")
+    parse_layout(layout.decode("utf-8"), "layout.json")
+    pictures = dict(_new_pictures(members, report))
+    if not pictures:
+        raise ReportError("it holds no picture that can be opened, so there is no content for a test")
+    case = {
+        "settings": report.settings.model_dump(),
+        "versions": report.versions,
+        "expected": {name: {"verified": True} for name in pictures},
+    }
+    text = json.dumps(case, indent=2, ensure_ascii=False) + "\n"
+    return {**pictures, "layout.json": layout, "case.json": text.encode()}
+
+
+def _new_pictures(members: _Members, report: ReportDocument) -> Iterator[tuple[str, bytes]]:
+    """(new name, content) of the pictures that can be opened."""
+    files = [picture.file for picture in report.pictures]
+    if len(set(files)) < len(files):
+        raise ReportError("a picture is named twice")
+    for number, picture in enumerate(report.pictures, start=1):
+        content = members.read(picture.file)
+        header = open_header(content)
+        try:
+            decode_bytes(content, picture.file)
+        except ImageFileError:
+            continue
+        ending = (header.format or "tiff").lower() if header is not None else "tiff"
+        yield f"picture-{number}.{ending}", content
 
 
 def main() -> None:
@@ -85,8 +132,10 @@ def main() -> None:
     try:
         folder = adopt(words.report, words.name)
     except ReportError as error:
-        sys.exit(f"error: {error}")
-    print(f"wrote {folder}; it is tested by: python -m pytest tests/extractor/reported -k {folder.name}")
+        sys.exit(f"error: {error_on_one_line(error)}")
+    print(
+        f"wrote {printable_path(folder)}; it is tested by: python -m pytest tests/extractor/reported -k {folder.name}"
+    )
 
 
 if __name__ == "__main__":

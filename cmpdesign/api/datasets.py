@@ -21,6 +21,7 @@ def dataset(
     shards: str | int | None = None,
     scheduler: str = "local",
     workers: int | None = None,
+    inputs_from: Sequence[str | Path] = (),
 ) -> DataSet:
     """Make a data set, as the command ``dataset`` does; the same call continues an interrupted data set.
 
@@ -36,9 +37,12 @@ def dataset(
         shards: the first N shards, or "A:B", the shards from A to below B; None: all.
         scheduler: "local", or "dask=ADDRESS", the address of a dask scheduler or its scheduler file.
         workers: processes on this machine; None: one for each core.
+        inputs_from: folders, beside the plan's own, whose height maps and pictures the plan may name. These files
+            become a part of the data set.
 
     Returns:
-        The finished shards, see ``cmpdesign.data.load``.
+        The finished shards, see ``cmpdesign.data.load``; ``cmpdesign.data.check`` compares all files with their
+        digests.
 
     Raises:
         CmpDesignError: the plan cannot be carried out, or workers were lost.
@@ -50,7 +54,7 @@ def dataset(
     from cmpdesign.design.templates import find_plan
 
     where = parse_scheduler(scheduler, workers)
-    make_dataset(find_plan(plan), output, parse_shards(shards), where)
+    make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from)
     return load(output)
 
 

@@ -10,15 +10,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cmpdesign.data.integrity import Checked as Checked
+    from cmpdesign.data.integrity import check as check
     from cmpdesign.data.reader import DataSet as DataSet
     from cmpdesign.data.reader import Frame as Frame
     from cmpdesign.data.reader import load as load
 
-__all__ = ["DataSet", "Frame", "load"]
+_HOMES = {
+    "Checked": "cmpdesign.data.integrity",
+    "DataSet": "cmpdesign.data.reader",
+    "Frame": "cmpdesign.data.reader",
+    "check": "cmpdesign.data.integrity",
+    "load": "cmpdesign.data.reader",
+}
+__all__ = ["Checked", "DataSet", "Frame", "check", "load"]
 
 
 def __getattr__(name: str) -> Any:
-    """Load the reader at its first use: the reader needs pyarrow."""
-    if name not in __all__:
+    """Load a module at its first use: the reader needs pyarrow."""
+    if name not in _HOMES:
         raise AttributeError(f"module 'cmpdesign.data' has no attribute {name!r}")
-    return getattr(import_module("cmpdesign.data.reader"), name)
+    return getattr(import_module(_HOMES[name]), name)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -25,6 +26,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from cmpdesign.data.named_files import check_named_files
+from cmpdesign.data.records import (
+    FORMAT_EXTRACTION,
+    FORMAT_FRAMES,
+    FORMAT_MANIFEST,
+    FORMAT_RECORD,
+    MOST_DIGITS,
+    PLAN_KINDS,
+    Manifest,
+    ShardRecord,
+)
 from cmpdesign.errors import CmpDesignError, InputError, OutputError
 from cmpdesign.files.atomic import (
     STAGE_PREFIX,
@@ -32,18 +44,17 @@ from cmpdesign.files.atomic import (
     remove_abandoned_stages,
     write_file,
     write_folder,
+    write_new_file,
 )
-from cmpdesign.inputs.documents import parse_json, read_json
+from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.files import open_file, path_exists, read_text
+from cmpdesign.inputs.records import checked_record, parse_record
 
-FORMAT_FRAMES, FORMAT_EXTRACTION = "cmp-dataset-plan", "cmp-extraction-plan"
-FORMAT_RECORD, FORMAT_MANIFEST = "cmp-dataset-shard", "cmp-dataset"
 PLAN, MANIFEST, UNFINISHED = "plan.json", "manifest.json", "unfinished"
 # Keys on which no frame depends.
 OUTSIDE_DIGEST = ("digest", "frames", "name", "description")
 BLOCK_BYTES = 1 << 20
-MOST_DIGITS = 6  # of a shard's number
-Record = Mapping[str, Any]
+_RECORD_NAME = re.compile(rf"([0-9]{{{MOST_DIGITS},9}})\.json")
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,34 +92,39 @@ def _without_locations(sources: Iterable[Mapping[str, Any]]) -> list[dict[str, A
 
 
 def open_folder(folder: Path, prepared: Prepared) -> None:
-    """Make the folder with its plan, or check that the folder has the same plan.
+    """Make the folder with its plan, or check that the folder has the same plan and the files that the plan names.
+
+    Of two processes with different plans, the first makes plan.json, and the other one changes no file.
 
     Raises:
-        CmpDesignError: the folder holds another plan, or other files.
+        CmpDesignError: the folder holds another plan, or other files; or a layout or an input was changed.
         OutputError: a file cannot be written.
     """
-    if path_exists(folder / PLAN):
+    path = folder / PLAN
+    text = json.dumps(prepared.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    others = path_exists(folder) and any(not _is_of_start(inner.name) for inner in folder.iterdir())
+    if others and not path_exists(path):
+        raise CmpDesignError(f"{folder}: is not empty and holds no plan.json; give a new folder")
+    if path_exists(path) or not write_new_file(path, text):
         there = read_plan(folder)
         if there["digest"] != prepared.document["digest"]:
             raise CmpDesignError(
                 f"{folder}: holds a data set of another plan (digest {there['digest'][:12]}, this one "
                 f"{prepared.document['digest'][:12]}); give a new folder"
             )
-    elif path_exists(folder) and any(not _is_of_start(path.name) for path in folder.iterdir()):
-        raise CmpDesignError(f"{folder}: is not empty and holds no plan.json; give a new folder")
-    text = json.dumps(prepared.document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     files: dict[str, str | bytes] = {
         name: content for name, content in prepared.files.items() if not path_exists(folder / name)
     }
-    if not path_exists(folder / PLAN) or read_text(folder / PLAN) != text:
-        files[PLAN] = text  # renamed last
+    if read_text(path) != text:
+        files[PLAN] = text  # of more frames, or with another description
     if files:
         write_folder(folder, files)
+    check_named_files(folder, prepared.document)
 
 
 def _is_of_start(name: str) -> bool:
-    """Whether another process, which starts at the same time, may have made this before plan.json."""
-    return name in ("layouts", "inputs") or name.startswith(STAGE_PREFIX)
+    """Whether another process, which starts at the same time, may have made this before or with plan.json."""
+    return name in (PLAN, "layouts", "inputs") or name.startswith(STAGE_PREFIX)
 
 
 def read_plan(folder: Path) -> Mapping[str, Any]:
@@ -126,12 +142,31 @@ def read_plan(folder: Path) -> Mapping[str, Any]:
 @lru_cache(maxsize=4)
 def _parse_plan(text: str, name: str) -> Mapping[str, Any]:
     plan = parse_json(text, name)
-    known = isinstance(plan, dict) and plan.get("format") in (FORMAT_FRAMES, FORMAT_EXTRACTION)
-    if not known or plan.get("version") != 1:
+    form = plan.get("format") if isinstance(plan, dict) else None
+    if not isinstance(form, str) or form not in PLAN_KINDS or plan.get("version") != 1:
         raise InputError(f"{name} is no plan of this version; expected {FORMAT_FRAMES}, version 1")
-    if plan_digest(plan) != plan.get("digest"):
+    checked_record(plan, name, PLAN_KINDS[form])
+    if plan_digest(plan) != plan["digest"]:
         raise InputError(f"{name} was changed: the digest is not that of the content; make a new data set")
     return dict(plan)
+
+
+def shard_frames(plan: Mapping[str, Any], number: int) -> int:
+    """Number of frames of a shard."""
+    if plan["format"] == FORMAT_FRAMES:
+        return int(plan["frames_a_shard"])
+    for source in plan["sources"]:
+        if number < len(source["ranges"]):
+            return int(source["ranges"][number][1])
+        number -= len(source["ranges"])
+    raise InputError(f"shard {number} does not exist")
+
+
+def shard_files(plan: Mapping[str, Any], number: int) -> set[str]:
+    """The names of a shard's files in the folder."""
+    name = shard_name(number)
+    tables = {f"tables/{name}.parquet"}
+    return tables | {f"images/{name}.tar"} if plan["format"] == FORMAT_FRAMES else tables
 
 
 def shard_name(number: int) -> str:
@@ -139,26 +174,31 @@ def shard_name(number: int) -> str:
     return f"{number:0{MOST_DIGITS}d}"
 
 
-def find_record(folder: Path, digest: str, number: int) -> Record | None:
-    """The record of a finished shard; None if the shard is not done.
+def find_record(folder: Path, plan: Mapping[str, Any], number: int) -> ShardRecord | None:
+    """The record of a finished shard; None if the shard is not done: without a record of this plan with its files.
 
     Args:
         folder: the data set.
-        digest: of its plan.
+        plan: the object of plan.json.
         number: of the shard.
     """
     path = folder / "shards" / f"{shard_name(number)}.json"
     try:
-        record = read_json(path)
-        sizes = {name: int(about["bytes"]) for name, about in record["files"].items()}
-        of_this_plan = record["format"] == FORMAT_RECORD and record["digest"] == digest
-    except (InputError, KeyError, TypeError, ValueError, AttributeError):
+        record = parse_record(read_text(path), str(path), ShardRecord)
+        sizes = {name: (folder / name).stat().st_size for name in shard_files(plan, number)}
+    except (InputError, OSError):
         return None
-    try:
-        complete = all((folder / name).stat().st_size == size for name, size in sizes.items())
-    except OSError:
-        return None
-    return dict(record) if of_this_plan and complete else None
+    is_whole = sizes == {name: about.bytes for name, about in record.files.items()}
+    return record if is_whole and record.shard == number and _is_of_plan(record, plan) else None
+
+
+def _is_of_plan(record: ShardRecord, plan: Mapping[str, Any]) -> bool:
+    return (
+        record.digest == plan["digest"]
+        and record.shard < number_of_shards(plan)
+        and record.frames == shard_frames(plan, record.shard)
+        and record.files.keys() == shard_files(plan, record.shard)
+    )
 
 
 @contextmanager
@@ -186,7 +226,7 @@ def unfinished_shard(folder: Path, number: int) -> Iterator[Stage]:
             parent.rmdir()
 
 
-def commit_shard(folder: Path, stage: Stage, number: int, about: Record) -> Record:
+def commit_shard(folder: Path, stage: Stage, number: int, about: Mapping[str, Any]) -> ShardRecord:
     """Move the staged files of a shard to their names, and write its record last.
 
     Args:
@@ -204,9 +244,10 @@ def commit_shard(folder: Path, stage: Stage, number: int, about: Record) -> Reco
         files[f"{staged.stem}/{path.name}"] = {"bytes": staged.stat().st_size, "sha256": file_digest(staged)}
         path.parent.mkdir(parents=True, exist_ok=True)
         stage.commit(staged, path)
-    record = {"format": FORMAT_RECORD, "version": 1, "shard": number, **about, "files": files}
+    document = {"format": FORMAT_RECORD, "version": 1, "shard": number, **about, "files": files}
+    record = checked_record(document, f"shard {number}", ShardRecord)
     staged = stage.folder / "shards.json"
-    staged.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    staged.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     (folder / "shards").mkdir(exist_ok=True)
     stage.commit(staged, folder / "shards" / f"{shard_name(number)}.json")
     return record
@@ -255,37 +296,42 @@ class Progress:
     bytes: int
 
 
-def _find_records(folder: Path, plan: Mapping[str, Any]) -> Iterator[Record]:
-    for number in range(number_of_shards(plan)):
-        record = find_record(folder, plan["digest"], number)
-        if record is not None:
-            yield record
+def recorded_shards(folder: Path, plan: Mapping[str, Any]) -> list[int]:
+    """The numbers of the shards of a plan for which the folder holds a record, also a wrong one."""
+    try:
+        names = [_RECORD_NAME.fullmatch(path.name) for path in (folder / "shards").iterdir()]
+    except OSError:
+        return []
+    count = number_of_shards(plan)
+    return sorted(int(name[1]) for name in names if name and int(name[1]) < count)
 
 
-def finished_records(folder: Path) -> list[Record]:
+def _find_records(folder: Path, plan: Mapping[str, Any]) -> list[ShardRecord]:
+    found = (find_record(folder, plan, number) for number in recorded_shards(folder, plan))
+    return [record for record in found if record is not None]
+
+
+def finished_records(folder: Path) -> list[ShardRecord]:
     """The records of the finished shards of a data set, from its manifest where this is complete.
 
     Raises:
         CmpDesignError: the folder holds no plan.
     """
     plan = read_plan(folder)
-    listed = _listed_records(folder, plan["digest"])
-    numbers = [record["shard"] for record in listed]
-    return listed if numbers == list(range(number_of_shards(plan))) else list(_find_records(folder, plan))
+    listed = _listed_records(folder, plan)
+    in_order = [record.shard for record in listed] == list(range(len(listed)))
+    is_complete = in_order and len(listed) == number_of_shards(plan)
+    return listed if is_complete else _find_records(folder, plan)
 
 
-def _listed_records(folder: Path, digest: str) -> list[Record]:
-    """The records in the manifest; none where the manifest cannot be read or belongs to another plan."""
+def _listed_records(folder: Path, plan: Mapping[str, Any]) -> list[ShardRecord]:
+    """The records in the manifest; none where the manifest cannot be read or contradicts the plan."""
     try:
-        manifest = read_json(folder / MANIFEST)
-        if manifest["plan"] != digest:
-            return []
-        return [
-            {**record, "shard": int(record["shard"]), "frames": int(record["frames"])}
-            for record in manifest["shards"]
-        ]
-    except (InputError, KeyError, TypeError, ValueError):
+        manifest = parse_record(read_text(folder / MANIFEST), MANIFEST, Manifest)
+    except InputError:
         return []
+    records = [shard.record(manifest.plan) for shard in manifest.shards]
+    return records if all(_is_of_plan(record, plan) for record in records) else []
 
 
 def write_manifest(folder: Path) -> Progress:
@@ -297,12 +343,8 @@ def write_manifest(folder: Path) -> Progress:
     """
     plan = read_plan(folder)
     count = number_of_shards(plan)
-    records = list(_find_records(folder, plan))
-    shards = [
-        {key: value for key, value in record.items() if key not in ("format", "version", "digest")}
-        for record in records
-    ]
-    frames = sum(record["frames"] for record in records)
+    records = _find_records(folder, plan)
+    frames = sum(record.frames for record in records)
     head = {
         "format": FORMAT_MANIFEST,
         "version": 1,
@@ -310,9 +352,9 @@ def write_manifest(folder: Path) -> Progress:
         "complete": len(records) == count,
         "frames": frames,
     }
-    lines = ",\n".join(f"  {json.dumps(shard)}" for shard in shards)
+    lines = ",\n".join(f"  {json.dumps(record.listed())}" for record in records)
     text = json.dumps(head, indent=1)[:-2] + f',\n "shards": [\n{lines}\n ]\n}}\n'
     write_file(folder / MANIFEST, text)
-    sizes = [about["bytes"] for record in records for about in record["files"].values()]
-    redrawn = sum(record.get("redrawn", 0) for record in records)
+    sizes = [about.bytes for record in records for about in record.files.values()]
+    redrawn = sum(record.redrawn or 0 for record in records)
     return Progress(len(records), frames, count, redrawn, sum(sizes))

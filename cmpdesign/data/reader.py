@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.data.files.webdataset import Member, read_member, read_members
-from cmpdesign.data.folder import Record, finished_records, number_of_shards, read_plan, shard_name
+from cmpdesign.data.folder import finished_records, number_of_shards, read_plan, shard_name
+from cmpdesign.data.named_files import named_layouts
+from cmpdesign.data.records import ShardRecord
 from cmpdesign.errors import InputError
 from cmpdesign.files.images import Image, ImageFileError, decode_bytes
 from cmpdesign.inputs.documents import parse_json
 from cmpdesign.libraries import extra
-from extractor import Reference, load_layout
+from extractor import Reference
 
 # Columns that are arrays of V views -> numbers a marker.
 _BY_VIEW = {"rest_xy_px": 2, "true_xy_px": 2, "visible": 0, "xy_px": 2, "cov_px2": 3, "status": 0}
@@ -74,9 +76,9 @@ class DataSet:
     def __init__(self, folder: Path) -> None:
         self.folder = folder.resolve()
         self.plan = read_plan(self.folder)
-        self._records: Sequence[Record] = finished_records(self.folder)
+        self._records: Sequence[ShardRecord] = finished_records(self.folder)
         self._numbers = frozenset(self.shards)
-        self._ends = np.cumsum([record["frames"] for record in self._records], dtype=np.int64)
+        self._ends = np.cumsum([record.frames for record in self._records], dtype=np.int64)
 
     def __len__(self) -> int:
         return int(self._ends[-1]) if len(self._ends) else 0
@@ -92,14 +94,12 @@ class DataSet:
     @property
     def shards(self) -> tuple[int, ...]:
         """The numbers of the finished shards."""
-        return tuple(record["shard"] for record in self._records)
+        return tuple(record.shard for record in self._records)
 
     @cached_property
     def layouts(self) -> Mapping[str, Reference]:
-        """The layouts by the designs' names; of an extraction one layout with the name ""."""
-        if "designs" not in self.plan:
-            return {"": load_layout(self.folder / self.plan["layout"]["file"])}
-        return {each["name"]: load_layout(self.folder / each["layout"]) for each in self.plan["designs"]}
+        """The layouts by the designs' names; of an extraction one layout with the name ""; see ``named_layouts``."""
+        return named_layouts(self.folder, self.plan)
 
     def table(self, columns: Sequence[str] | None = None, shards: Iterable[int] | None = None) -> Any:
         """An Arrow table of all frames, or of the frames of some shards.
@@ -137,8 +137,8 @@ class DataSet:
         place %= len(self)
         at = int(np.searchsorted(self._ends, place, side="right"))
         record = self._records[at]
-        row = place - int(self._ends[at] - record["frames"])
-        shard = record["shard"]
+        row = place - int(self._ends[at] - record.frames)
+        shard = record.shard
         return self._frame(shard, _kept_table(self._path(shard, "tables")), row, self._members(shard))
 
     def _frame(self, shard: int, rows: Any, place: int, members: Mapping[str, Member]) -> Frame:
@@ -212,7 +212,8 @@ def _damage_told(path: Path) -> Iterator[None]:
         yield
     except (pyarrow.ArrowException, OSError) as error:
         raise InputError(
-            f"{path}: cannot be read ({str(error).splitlines()[0]}); make the shard again by the same command"
+            f"{path}: cannot be read ({str(error).splitlines()[0]}); delete shards/{path.stem}.json beside it, and the "
+            "command that made the data set makes the shard again"
         ) from None
 
 

@@ -55,7 +55,13 @@ def parse_shards(text: str | int | None) -> ShardRange:
     return ShardRange(int(parts[0]), int(parts[1]))
 
 
-def make_dataset(plan: str | Path, folder: str | Path, shards: ShardRange, scheduler: Scheduler) -> Progress:
+def make_dataset(
+    plan: str | Path,
+    folder: str | Path,
+    shards: ShardRange,
+    scheduler: Scheduler,
+    inputs_from: Sequence[str | Path] = (),
+) -> Progress:
     """Make the shards of a plan that are not done yet.
 
     Args:
@@ -63,12 +69,13 @@ def make_dataset(plan: str | Path, folder: str | Path, shards: ShardRange, sched
         folder: the data set: a new folder, or the folder of an interrupted run of the same plan.
         shards: the range of shards.
         scheduler: the workers.
+        inputs_from: see ``prepare_plan``.
 
     Raises:
         CmpDesignError: the plan cannot be carried out, or the folder holds other files; workers were lost.
         OutputError: a file cannot be written. Finished shards are kept, and no shard is half-written.
     """
-    return _carry_out(prepare_plan(plan), Path(folder).resolve(), shards, scheduler)
+    return _carry_out(prepare_plan(plan, inputs_from), Path(folder).resolve(), shards, scheduler)
 
 
 def extract_markers(
@@ -121,8 +128,7 @@ def _carry_out(prepared: Prepared, folder: Path, shards: ShardRange, scheduler: 
         )
     open_folder(folder, prepared)
     wanted = range(shards.first, end)
-    digest = prepared.document["digest"]
-    missing = [number for number in wanted if find_record(folder, digest, number) is None]
+    missing = [number for number in wanted if find_record(folder, prepared.document, number) is None]
     done = len(wanted) - len(missing)
     tell(done, len(wanted), "shards")
     try:

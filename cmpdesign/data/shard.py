@@ -10,21 +10,15 @@ from typing import Any
 
 from cmpdesign.data.files.tables import PREFIX, Row, frame_columns, frame_key, frame_row, write_table
 from cmpdesign.data.files.webdataset import TarWriter
-from cmpdesign.data.folder import (
-    FORMAT_EXTRACTION,
-    Record,
-    commit_shard,
-    find_record,
-    read_plan,
-    unfinished_shard,
-)
+from cmpdesign.data.folder import commit_shard, find_record, read_plan, unfinished_shard
 from cmpdesign.data.frames.frame import FrameMaker
+from cmpdesign.data.records import FORMAT_EXTRACTION, ShardRecord
 from cmpdesign.data.videos.extraction import EXTRACTED, range_rows
 
 IMAGES, TABLES = "images.tar", "tables.parquet"
 
 
-def make_shard(folder: str, number: int) -> Record:
+def make_shard(folder: str, number: int) -> ShardRecord:
     """Make one shard of the data set in a folder, unless the shard is finished.
 
     Args:
@@ -40,7 +34,7 @@ def make_shard(folder: str, number: int) -> Record:
     """
     path = Path(folder)
     plan = read_plan(path)
-    done = find_record(path, plan["digest"], number)
+    done = find_record(path, plan, number)
     if done is not None:
         return done
     with unfinished_shard(path, number) as stage:

@@ -25,7 +25,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "verify": (reading.VerifyDocument,),
     "track": (runs.TrackDocument, runs.RecoverDocument),
     "reconstruct": (runs.ReconstructDocument, runs.RecoverDocument),
-    "dataset": (data.DatasetDocument,),
+    "dataset": (data.DatasetDocument, data.DatasetCheckDocument),
     "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument,),
     "calibrate camera": (calibration.CalibrateCameraDocument,),

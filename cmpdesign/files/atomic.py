@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,6 +16,7 @@ from cmpdesign.errors import OutputError
 from cmpdesign.files.locks import Lock, open_for_lock, try_lock
 
 STAGE_PREFIX = ".cmpdesign-"
+REMOVALS, REMOVAL_WAIT_S = 40, 0.05  # of a folder that gets new files while it is removed
 # Names that ``tempfile.mkdtemp`` makes from the prefix.
 _STAGE_NAME = re.compile(re.escape(STAGE_PREFIX) + "[a-z0-9_]{8}")
 
@@ -59,8 +61,12 @@ class Stage:
         sync_folder(path.parent)
 
     def close(self) -> None:
-        """Remove the folder and its content."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        """Remove the folder and its content; threads of a library may still write into it for a moment."""
+        for _ in range(REMOVALS):
+            shutil.rmtree(self.folder, ignore_errors=True)
+            if not self.folder.exists():
+                break
+            time.sleep(REMOVAL_WAIT_S)
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
@@ -130,6 +136,31 @@ def write_file(path: str | Path, content: str | bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         with staged_file(path) as staged:
             staged.write_bytes(_to_bytes(content))
+
+
+def write_new_file(path: str | Path, content: str | bytes) -> bool:
+    """Write a file as ``write_file`` does, unless another process has made it: of two processes, one gets False.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    path = Path(path)
+    with _as_output_error(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with Stage(path.parent) as stage:
+            staged = stage.folder / "staged"
+            staged.write_bytes(_to_bytes(content))
+            sync_file(staged)
+            try:
+                os.link(staged, path)
+            except FileExistsError:
+                return False
+            except OSError:  # a file system without a second name of a file
+                if path.exists():
+                    return False
+                staged.rename(path)
+            sync_folder(path.parent)
+    return True
 
 
 def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -53,7 +54,7 @@ def read_json(path: str | Path) -> Any:
 
 
 def parse_json(text: str, name: str) -> Any:
-    """The value of a JSON text; names that are given twice are refused.
+    """The value of a JSON text; names that are given twice, NaN and infinite numbers are refused.
 
     Raises:
         InputError: no JSON, or beyond a limit.
@@ -70,15 +71,20 @@ def parse_json(text: str, name: str) -> Any:
         raise InputError(f"{name}: the field {error} is given more than once") from None
     except ValueError:  # the interpreter's limit on the digits of an integer
         raise InputError(f"{name}: holds a number of more than {MOST_DIGITS} digits") from None
-    require_plain_values(value, name)
+    require_plain_values(value, name, finite=True)
     return value
 
 
-def require_plain_values(document: Any, name: str) -> None:
-    """Check the nesting, the whole numbers and the texts of a document.
+def require_plain_values(document: Any, name: str, *, finite: bool = False) -> None:
+    """Check the nesting, the numbers and the texts of a document.
+
+    Args:
+        document: the document.
+        name: the prefix of messages.
+        finite: refuse NaN and infinite numbers, which TOML has and JSON has not.
 
     Raises:
-        InputError: nested too deeply, a number of too many digits, or a text with half a surrogate pair.
+        InputError: nested too deeply, a number that is not allowed, or a text with half a surrogate pair.
     """
     level: list[Any] = [document]
     for _ in range(MOST_LEVELS):
@@ -93,6 +99,8 @@ def require_plain_values(document: Any, name: str) -> None:
                 _require_plain_texts((value,), name)
             elif isinstance(value, int) and abs(value) >= 10**MOST_DIGITS:
                 raise InputError(f"{name}: holds a number of more than {MOST_DIGITS} digits")
+            elif finite and isinstance(value, float) and not math.isfinite(value):
+                raise InputError(f"{name}: holds the number {value}; expected finite numbers")
         if not inner:
             return
         level = inner

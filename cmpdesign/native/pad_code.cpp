@@ -161,8 +161,8 @@ Index partner(Index cell, const std::vector<Index>& members, const Array<std::ui
   return NONE;
 }
 
-// (C,) 1 for the white ones of C black cells: such that any two windows differ in at least `wanted` cells; all 0
-// if no such choice is found within `steps` exchanges.
+// (C,) 1 for the white ones of C black cells: such that any two windows differ in at least `wanted` cells;
+// all 0 if no such choice is found within `steps` exchanges.
 //
 // windows (W, K): the cells of every window, in the order of their places. ring (C,): the ring of each cell.
 // whites (R,): number of white cells of each ring besides `fixed`, a cell that is white always.

@@ -102,8 +102,8 @@ class CodeFigures:
         """One sentence."""
         return (
             f"{self.id} of 1 to {self.room}: {self.white_cells} of {self.black_cells} black cells are white; the "
-            f"smallest window that is numbered by the code alone is a hexagon of the radius {self.window_radius} "
-            f"({self.window_cells} black cells), and any two of these differ in {self.window_distance} cells or more"
+            f"smallest window whose place the code shows is a hexagon of the radius {self.window_radius} "
+            f"({self.window_cells} black cells); any two of these differ in {self.window_distance} cells or more"
         )
 
 

@@ -18,18 +18,58 @@ import zipfile
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import Image, to_png
+from cmpdesign.inputs.names import Name
+from cmpdesign.inputs.options import Preset
+from cmpdesign.inputs.records import Record, parse_record
 from cmpdesign.libraries import OPENCV_DISTRIBUTIONS
 
 FORMAT, VERSION = "cmp-problem-report", 1
 MOST_PICTURES = 20
 _LIBRARIES = ("numpy", *OPENCV_DISTRIBUTIONS, "scipy")
 _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same bundle has the same bytes
+
+
+class Settings(Record):
+    """Options of the reading."""
+
+    preset: Preset
+    response: Name | float | None
+    channels: Literal["bgr", "rgb"]
+    min_share: float = Field(ge=0, le=1)
+
+
+class ReportedPicture(Record):
+    """A picture and its verdict; no program depends on the verdict."""
+
+    file: Annotated[str, Field(pattern="^pictures/", max_length=300)]
+    verdict: dict[str, Any]
+
+
+class ReportDocument(Record):
+    """report.json."""
+
+    format: Literal["cmp-problem-report"]
+    version: Literal[1]
+    settings: Settings
+    versions: dict[Name, Name] = Field(max_length=50)
+    pictures: list[ReportedPicture] = Field(min_length=1, max_length=MOST_PICTURES)
+
+
+def parse_report(text: str, name: str) -> ReportDocument:
+    """The document of report.json; ``name`` is the prefix of messages.
+
+    Raises:
+        InputError: no JSON, or not of the schema.
+    """
+    return parse_record(text, name, ReportDocument)
 
 
 class ProblemReport:

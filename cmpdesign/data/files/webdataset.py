@@ -83,5 +83,5 @@ def read_member(path: Path, member: Member) -> bytes:
         file.seek(member.start)
         content = file.read(member.size)
     if len(content) < member.size:
-        raise InputError(f"{path}: ends too early; the shard is damaged, make it again")
+        raise InputError(f"{path}: ends too early: the shard is damaged; see cmpdesign dataset --check")
     return content

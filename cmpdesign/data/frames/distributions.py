@@ -31,6 +31,7 @@ KINDS: Mapping[str, frozenset[str]] = {
     "chance": frozenset({"of"}),
 }
 MOST_REPEATS = 1000
+MOST_VALUES = 10_000  # of one draw; a scene of 100 blobs, scratches and lamps each has some 2,000
 MOST_DEVIATIONS = 3.0
 Scalar = str | float | int | bool
 
@@ -113,24 +114,59 @@ def _chosen(count: int, weights: Sequence[float] | None, rng: Source) -> int:
 
 
 def check_distributions(value: Any, path: str) -> None:
-    """Check all distributions of a document.
+    """Check all distributions of a document, and the number of values that one draw can have.
 
     Raises:
-        CmpDesignError: an unknown key, or numbers that are no distribution; the message begins with the path.
+        CmpDesignError: an unknown key, numbers that are no distribution, or too many values; the message begins with
+            the path.
     """
+    _check_value(value, path)
+    most = _most_values(value)
+    if most > MOST_VALUES:
+        raise CmpDesignError(
+            f"{path}: one draw can have {most:.4g} values; the limit is {MOST_VALUES}; make repeat smaller"
+        )
+
+
+def _most_values(value: Any) -> int:
+    """The largest number of values that a draw of a checked value can have."""
+    match distribution_kind(value):
+        case "repeat":
+            return max(_whole_numbers(value["repeat"]) or [0]) * _most_values(value["of"])
+        case "choice":
+            return max(map(_most_values, value["choice"]))
+        case "chance":
+            return _most_values(value["of"])
+    inner = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else ()
+    return 1 + sum(map(_most_values, inner))
+
+
+def is_drawn(table: Mapping[str, Any], key: str, place: int | None = None) -> bool:
+    """Whether a draw can contain the value at a key of a checked table, or one of its choices.
+
+    A distribution leaves a value out by a chance, a weight or a repeat of 0.
+    """
+    if key == "of" and "chance" in table:
+        return bool(table["chance"] > 0)
+    if key == "of" and "repeat" in table:
+        return max(_whole_numbers(table["repeat"]) or [0]) > 0
+    return place is None or table.get("weights") is None or bool(table["weights"][place] > 0)
+
+
+def _check_value(value: Any, path: str) -> None:
     kind = distribution_kind(value)
     if kind is not None:
         _check_kind(kind, value, path)
     elif isinstance(value, Mapping):
         for key, inner in value.items():
-            check_distributions(inner, f"{path}.{key}")
+            _check_value(inner, f"{path}.{key}")
     elif isinstance(value, list | tuple):
         for place, inner in enumerate(value):
             if distribution_kind(inner) == "chance":
                 raise CmpDesignError(
                     f"{path}.{place}: chance is not allowed in a list; use repeat for a list"
                 )
-            check_distributions(inner, f"{path}.{place}")
+            _check_value(inner, f"{path}.{place}")
 
 
 def _check_kind(kind: str, table: Mapping[str, Any], path: str) -> None:
@@ -141,7 +177,7 @@ def _check_kind(kind: str, table: Mapping[str, Any], path: str) -> None:
     if "of" in KINDS[kind]:
         if "of" not in table:
             raise CmpDesignError(f"{path}: {kind} needs of, the value that is repeated or may be absent")
-        check_distributions(table["of"], path)
+        _check_value(table["of"], path)
     given = table[kind]
     match kind:
         case "choice":
@@ -163,7 +199,7 @@ def _check_choice(table: Mapping[str, Any], path: str) -> None:
     given, weights = table["choice"], table.get("weights")
     _require(isinstance(given, list) and bool(given), path, "choice", given, "a list of one value or more")
     for inner in given:
-        check_distributions(inner, path)
+        _check_value(inner, path)
     if weights is not None:
         good = isinstance(weights, list) and len(weights) == len(given)
         good = good and all(_is_number(weight) and weight >= 0 for weight in weights) and sum(weights) > 0

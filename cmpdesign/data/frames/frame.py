@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from cmpdesign.contact import Contact
 from cmpdesign.data.frames.distributions import draw
 from cmpdesign.data.frames.plan import PlanError, design_choice
+from cmpdesign.data.named_files import check_inputs, named_layouts
 from cmpdesign.files.images import decode_bytes, to_jpeg, to_png
 from cmpdesign.layout.layout import Layout
 from cmpdesign.reading.read_layout import layout_from_reference
 from cmpdesign.scene import Pinhole, Rendered, Scene, SceneError, Sensor, render
 from cmpdesign.scene.drawing.view import scene_views
 from cmpdesign.scene.files.scene_file import SceneFile, SolvedScene, scene_from_document
-from extractor import Extractor, Markers, Reference, load_layout
+from extractor import Extractor, Markers, Reference
 from extractor.pipeline import Side
 
 MOST_ATTEMPTS = 20  # draws of one frame
@@ -82,13 +83,13 @@ class FrameMaker:
 
     def __init__(self, folder: Path, plan: Mapping[str, Any]) -> None:
         self._folder, self._plan = folder, plan
-        self._designs = [self._design(each) for each in plan["designs"]]
+        check_inputs(folder, plan)
+        self._designs = [
+            ReadableDesign(name, reference, layout_from_reference(reference))
+            for name, reference in named_layouts(folder, plan).items()
+        ]
         self._readers: dict[str, Extractor] = {}
         self._choice = design_choice(plan["designs"], plan["weights"])
-
-    def _design(self, about: Mapping[str, Any]) -> ReadableDesign:
-        reference = load_layout(self._folder / about["layout"])
-        return ReadableDesign(about["name"], reference, layout_from_reference(reference))
 
     def _reader(self, design: ReadableDesign, mirrored: bool, response: Any) -> Extractor:
         """The reader for a side and the sensor's response; the last readers are kept."""

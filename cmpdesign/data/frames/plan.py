@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from cmpdesign import __version__
-from cmpdesign.data.folder import FORMAT_FRAMES, Prepared, plan_digest
-from cmpdesign.data.frames.distributions import ABSENT, Source, check_distributions, distribution_kind, draw
+from cmpdesign.data.folder import Prepared, plan_digest
+from cmpdesign.data.frames.distributions import Source, check_distributions, draw
+from cmpdesign.data.frames.inputs import take_inputs
+from cmpdesign.data.records import (
+    FORMAT_FRAMES,
+    MOST_DESIGNS,
+    MOST_FRAMES,
+    MOST_FRAMES_A_SHARD,
+    ImageTable,
+    MarkersTable,
+)
 from cmpdesign.design.design import load_design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.layout_json import layout_to_json, pattern_digest
-from cmpdesign.inputs.documents import read_toml
-from cmpdesign.inputs.files import MOST_DATA_BYTES, read_file
+from cmpdesign.inputs.documents import read_toml, require_plain_values
 from cmpdesign.inputs.names import Line, Name
-from cmpdesign.inputs.options import Preset
+from cmpdesign.inputs.records import Record
 from cmpdesign.inputs.validation import validation_message
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
@@ -29,8 +36,6 @@ from cmpdesign.reading.read_layout import read_layout
 from cmpdesign.scene.errors import SceneError
 from cmpdesign.scene.files.scene_file import scene_from_document
 
-MOST_FRAMES = 10**9
-MOST_FRAMES_A_SHARD = 100_000
 TRIALS = 32  # documents that are drawn and checked, without solving or drawing, before the work begins
 NOT_IN_SCENE = {
     "seed": "every frame has its own seed",
@@ -42,27 +47,7 @@ class PlanError(CmpDesignError, ValueError):
     """A plan that cannot be carried out."""
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class ImageTable(_Table):
-    """[image]: the encoding of a frame's picture."""
-
-    kind: Literal["jpeg", "png"] = Field(
-        "jpeg", description="JPEG keeps the full resolution of color (4:4:4)."
-    )
-    quality: int = Field(95, ge=1, le=100, description="Of JPEG.")
-
-
-class MarkersTable(_Table):
-    """[markers]: the reading of the markers from the encoded picture."""
-
-    read: bool = True
-    preset: Preset = "balanced"
-
-
-class PlanTable(_Table):
+class PlanTable(Record):
     """A whole plan."""
 
     name: Name = ""
@@ -70,7 +55,7 @@ class PlanTable(_Table):
     frames: int = Field(ge=1, le=MOST_FRAMES)
     frames_a_shard: int = Field(1000, ge=1, le=MOST_FRAMES_A_SHARD)
     seed: int = Field(0, ge=0)
-    designs: list[str] = Field(min_length=1, max_length=1000)
+    designs: list[str] = Field(min_length=1, max_length=MOST_DESIGNS)
     weights: list[float] | None = None
     largest_strain: float | None = Field(
         None, gt=0, description="Contacts of a larger strain are drawn anew; null: no limit."
@@ -109,8 +94,12 @@ class NamedLayout:
     layout: Layout
 
 
-def prepare_plan(path: str | Path) -> Prepared:
+def prepare_plan(path: str | Path, inputs_from: Sequence[str | Path] = ()) -> Prepared:
     """Read and check a plan: designs, distributions, and scenes of some draws, without solving or drawing.
+
+    Args:
+        path: the TOML file.
+        inputs_from: folders, beside the plan's own, whose height maps and pictures the plan may name.
 
     Raises:
         CmpDesignError: a value that cannot be carried out; the message names the file and the key.
@@ -130,7 +119,8 @@ def prepare_plan(path: str | Path) -> Prepared:
     _require_different_names(layouts, path)
     if table.markers.read:
         _require_readable(layouts, path)
-    scene, inputs = _take_inputs(table.scene, path.parent)
+    require_plain_values(table.scene, f"{path}: scene", finite=True)
+    scene, inputs = take_inputs(table.scene, path, inputs_from)
     _try_scenes(table.scene, [each.layout for each in layouts], path)
     files = {f"layouts/{each.name}.json": layout_to_json(each.layout).encode() for each in layouts} | inputs
     plan = _plan_document(table, scene, layouts, inputs)
@@ -194,29 +184,6 @@ def _require_readable(layouts: list[NamedLayout], path: Path) -> None:
             )
 
 
-def _take_inputs(scene: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """The scene with the paths of its height maps and pictures in the data set, and these files."""
-    taken: dict[str, bytes] = {}
-    changed = copy.deepcopy(dict(scene))
-    for table in _tables_with_path(changed):
-        content = read_file(folder / table["path"], MOST_DATA_BYTES)
-        name = f"inputs/{hashlib.sha256(content).hexdigest()[:16]}{Path(table['path']).suffix}"
-        taken[name] = content
-        table["path"] = name
-    return changed, taken
-
-
-def _tables_with_path(value: Any) -> Iterator[dict[str, Any]]:
-    if isinstance(value, dict):
-        if isinstance(value.get("path"), str):
-            yield value
-        for inner in value.values():
-            yield from _tables_with_path(inner)
-    elif isinstance(value, list):
-        for inner in value:
-            yield from _tables_with_path(inner)
-
-
 class _Ends:
     """Draws one end of every range."""
 
@@ -236,8 +203,8 @@ def _try_scenes(scene: Mapping[str, Any], layouts: list[Layout], path: Path) -> 
     sources: list[Source] = [_Ends(0.0), _Ends(1.0 - 2**-53), *[rng] * TRIALS]
     for number, source in enumerate(sources):
         drawn = draw(scene, source)
-        if drawn is ABSENT or distribution_kind(drawn):
-            raise PlanError(f"{path}: scene is no table")
+        if not isinstance(drawn, dict):
+            raise PlanError(f"{path}: scene is no table in a draw; give a table, or a choice of tables")
         try:
             scene_from_document(drawn, path, layouts[number % len(layouts)])
         except SceneError as error:

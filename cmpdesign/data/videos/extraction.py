@@ -11,14 +11,16 @@ from typing import Any, Literal
 
 from cmpdesign import __version__
 from cmpdesign.data.files.tables import Row, lost_values, marker_values
-from cmpdesign.data.folder import FORMAT_EXTRACTION, Prepared, file_digest, plan_digest
+from cmpdesign.data.folder import Prepared, file_digest, plan_digest, read_plan
+from cmpdesign.data.named_files import named_layouts
+from cmpdesign.data.records import FORMAT_EXTRACTION
 from cmpdesign.data.videos.pieces import NumberedFrame, Piece, piece_frames, video_pieces
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import ImageFileError, is_image_file, read_image
-from cmpdesign.files.layout_json import layout_to_json
+from cmpdesign.files.layout_json import layout_to_json, pattern_digest
 from cmpdesign.inputs.sources import SourceError, SourceKind, name_sources
 from cmpdesign.reading.read_layout import layout_from_reference
-from extractor import Extractor, Reference, load_layout
+from extractor import Extractor, Reference
 from extractor.image.input import Channels
 from extractor.pipeline import Side
 from extractor.presets import Preset
@@ -108,17 +110,17 @@ def _cut_pictures(count: int, frames_a_shard: int) -> list[Piece]:
 
 def prepare_extraction(layout: Reference, sources: Sequence[Mapping[str, Any]], options: Reading) -> Prepared:
     """The plan of an extraction from indexed sources."""
+    written = layout_from_reference(layout)
     plan = {
         "format": FORMAT_EXTRACTION,
         "version": 1,
         "made_with": f"cmpdesign {__version__}",
         "frames": sum(source["frames"] for source in sources),
-        "layout": {"file": LAYOUT, "digest": layout.digest},
+        "layout": {"file": LAYOUT, "digest": pattern_digest(written)},
         "reading": asdict(options),
         "sources": list(sources),
     }
-    text = layout_to_json(layout_from_reference(layout))
-    return Prepared(plan | {"digest": plan_digest(plan)}, {LAYOUT: text.encode()})
+    return Prepared(plan | {"digest": plan_digest(plan)}, {LAYOUT: layout_to_json(written).encode()})
 
 
 def range_rows(folder: Path, plan: Mapping[str, Any], number: int) -> list[Row]:
@@ -128,7 +130,7 @@ def range_rows(folder: Path, plan: Mapping[str, Any], number: int) -> list[Row]:
         CmpDesignError: the source was changed after it was cut.
     """
     source, piece = _piece(plan, number)
-    extractor = _extractor(folder / LAYOUT, Reading(**plan["reading"]))
+    extractor = _extractor(folder, plan["digest"])
     rows: list[Row] = []
     for frame in _frames(source, piece):
         if frame.image is None:
@@ -153,8 +155,12 @@ def _piece(plan: Mapping[str, Any], number: int) -> tuple[Mapping[str, Any], Pie
 
 
 @lru_cache(maxsize=2)
-def _extractor(layout: Path, reading: Reading) -> Extractor:
-    return Extractor(load_layout(layout), reading.preset, reading.response, reading.side, reading.channels)
+def _extractor(folder: Path, digest: str) -> Extractor:
+    """The reader of a plan, kept from shard to shard; the digest distinguishes plans in one folder."""
+    plan = read_plan(folder)
+    reading = Reading(**plan["reading"])
+    layout = named_layouts(folder, plan)[""]
+    return Extractor(layout, reading.preset, reading.response, reading.side, reading.channels)
 
 
 def _frames(source: Mapping[str, Any], piece: Piece) -> Iterator[NumberedFrame]:

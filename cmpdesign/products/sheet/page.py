@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +91,8 @@ def page_to_pdf(page: Page) -> bytes:
 
     result = io.BytesIO()
     size = (page.width_mm * POINTS_PER_MM, page.height_mm * POINTS_PER_MM)
-    canvas = Canvas(result, pagesize=size, invariant=1)
+    with _no_date_of_environment():
+        canvas = Canvas(result, pagesize=size, invariant=1)
     canvas.setTitle(page.title)
     # From here on coordinates are in mm, y up.
     canvas.scale(POINTS_PER_MM, POINTS_PER_MM)
@@ -109,6 +112,17 @@ def page_to_pdf(page: Page) -> bytes:
     canvas.showPage()
     canvas.save()
     return result.getvalue()
+
+
+@contextmanager
+def _no_date_of_environment() -> Iterator[None]:
+    """Within this context, reportlab takes its own fixed date: it prefers SOURCE_DATE_EPOCH also where invariant."""
+    date = os.environ.pop("SOURCE_DATE_EPOCH", None)
+    try:
+        yield
+    finally:
+        if date is not None:
+            os.environ["SOURCE_DATE_EPOCH"] = date
 
 
 def _pdf_text(canvas: Any, item: TextLine, height_mm: float) -> None:

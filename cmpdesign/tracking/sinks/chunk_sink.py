@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cmpdesign.errors import OutputError, parameter
 from cmpdesign.tracking.columns import FrameTable
@@ -15,6 +15,20 @@ from cmpdesign.tracking.sinks.chunk_files import find_chunks, save_chunk
 from cmpdesign.tracking.sinks.unfinished import FLUSH_S, lock_folder, part_path, release_lock
 
 CHUNK_FRAMES = 256
+CHUNK_IMAGE_BYTES = 64 << 20  # of images that wait for their chunk
+
+
+class _WaitingImage(NamedTuple):
+    """The image of a frame, or its list of images, until the frame's chunk is on disk."""
+
+    frame: int
+    image: Any
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        images = self.image if isinstance(self.image, list) else [self.image]
+        return sum(0 if image is None else int(image.nbytes) for image in images)
 
 
 class ChunkSink:
@@ -32,30 +46,32 @@ class ChunkSink:
         self._part.mkdir()
         self._lock = lock_folder(self._part)
         self._frames: list[Any] = []
+        self._images: list[_WaitingImage] = []  # a chunk's images are written after the chunk
+        self._failure = ""
         self._chunks, self._kept = 0, 0
         self._last = time.monotonic()
 
     def add(self, frame: Any, image: Any = None) -> None:
-        if self._with_images:
-            self._keep_images(frame.index, image)
         self._frames.append(frame)
-        if len(self._frames) >= CHUNK_FRAMES or time.monotonic() - self._last > FLUSH_S:
+        if self._with_images:
+            self._images.append(_WaitingImage(frame.index, image))
+        waiting = sum(one.size for one in self._images)
+        is_late = time.monotonic() - self._last > FLUSH_S
+        if len(self._frames) >= CHUNK_FRAMES or waiting > CHUNK_IMAGE_BYTES or is_late:
             self._flush()
 
-    def _keep_images(self, frame: int, image: Any) -> None:
-        """Images are written before the chunk of their frame, so that every complete chunk has its images."""
-        try:
-            keep_images(self._part, frame, image)
-        except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
-
     def _flush(self) -> None:
+        """Write the waiting frames as a chunk, then their images: what is on disk always has its frames."""
         try:
             if self._frames:
                 self._save_frames(self._frames)
+            self._frames, images, self._images = [], self._images, []
+            for one in images:
+                keep_images(self._part, one.frame, one.image)
         except OSError as error:
-            raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None
-        self._frames, self._last = [], time.monotonic()
+            self._failure = f"{self._path}: cannot be written ({error.strerror or error})"
+            raise OutputError(self._failure) from None
+        self._last = time.monotonic()
 
     def _save_frames(self, frames: list[Any]) -> None:
         """Save frames as one chunk; if the chunk does not fit on the disk, as two halves."""
@@ -75,6 +91,8 @@ class ChunkSink:
     def close(self) -> None:
         try:
             self._flush()
+            if self._failure:
+                raise OutputError(self._failure)
             found = find_chunks(self._part)
             if found.problems:
                 raise OutputError(f"{self._path}: cannot be assembled ({'; '.join(found.problems)})")
@@ -91,4 +109,6 @@ class ChunkSink:
     def kept(self) -> str:
         if not self._part.exists():
             return f"{self._kept} frames are kept in {self._path}"
+        if not self._kept:
+            return f"no frame is kept; free disk space, then call again, which removes {self._part}"
         return f"{self._kept} frames are kept in {self._part}; free disk space, then call with {parameter('recover')}"

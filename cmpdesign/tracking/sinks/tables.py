@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,7 +15,7 @@ from cmpdesign.inputs.files import is_folder, is_regular_file, open_file
 from cmpdesign.tracking.columns import FrameTable
 from cmpdesign.tracking.recording.options import RecordedTable, Recording, is_recording
 from cmpdesign.tracking.sinks.assembly import assemble_table
-from cmpdesign.tracking.sinks.chunk_files import find_chunks
+from cmpdesign.tracking.sinks.chunk_files import Chunk, find_chunks
 from cmpdesign.tracking.sinks.chunk_sink import ChunkSink
 from cmpdesign.tracking.sinks.csv_recovery import recover_csv
 from cmpdesign.tracking.sinks.csv_sink import CsvSink
@@ -113,7 +114,17 @@ def _recover_chunks(part: Path, path: Path) -> Recovered:
     found = find_chunks(part)
     if found.about is None:
         return Recovered(0, found.problems)
-    return Recovered(assemble_table(found.chunks, found.about, path), found.problems)
+    problems = (*found.problems, *_lost_images(part, found.chunks))
+    return Recovered(assemble_table(found.chunks, found.about, path), problems)
+
+
+def _lost_images(part: Path, chunks: Sequence[Chunk]) -> Iterator[str]:
+    """One sentence where a part of the frames has no image: images are written after the chunk of their frames."""
+    with_image = {image.name.partition(".")[0] for image in part.glob("[0-9]*.png")}
+    frames = [f"{number:09d}" for chunk in chunks for number in chunk.frames.tolist()]
+    without = sum(frame not in with_image for frame in frames)
+    if with_image and without:
+        yield f"{without} of {len(frames)} frames have no image"
 
 
 def _require_kind(path: Path) -> None:

@@ -263,7 +263,7 @@ def test_damage_is_told_with_what_helps(made: Path, tmp_path: Path) -> None:
     folder = tmp_path / "data"
     shutil.copytree(made, folder)
     (folder / "tables" / "000001.parquet").write_bytes(b"no table")
-    with pytest.raises(InputError, match=r"000001.parquet: cannot be read \(.*make the shard again"):
+    with pytest.raises(InputError, match=r"000001.parquet: cannot be read \(.*makes the shard again"):
         load(folder)[2]
     (folder / "images" / "000000.tar").write_bytes(b"no tar" * 200)
     with pytest.raises(InputError, match=r"000000.tar is no tar file"):

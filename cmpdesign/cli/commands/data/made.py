@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmpdesign.cli.terminal import finish, printable_path, say
+from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
 
 if TYPE_CHECKING:
     from cmpdesign.data.folder import Progress
+    from cmpdesign.data.integrity import Checked
 
 
 def print_made(folder: Path, made: Progress) -> None:
@@ -31,3 +32,24 @@ def print_made(folder: Path, made: Progress) -> None:
             bytes=made.bytes,
         )
     )
+
+
+def print_checked(folder: str, checked: Checked) -> None:
+    """Print the result of a check, and end the command: with exit code 1 if a file is damaged."""
+    from cmpdesign.documents.data import DatasetCheckDocument
+
+    for problem in checked.problems:
+        print_warning(problem)
+    say(
+        f"{printable_path(folder)}: {checked.shards} of {checked.of_shards} shards are whole, "
+        f"{checked.frames} frames, {checked.bytes / 1e6:.3g} MB; {len(checked.problems) or 'no'} problems"
+    )
+    document = DatasetCheckDocument(
+        folder=printable_path(folder),
+        shards=checked.shards,
+        of_shards=checked.of_shards,
+        frames=checked.frames,
+        bytes=checked.bytes,
+        problems=list(checked.problems),
+    )
+    finish(lambda: document, 1 if checked.problems else 0)
