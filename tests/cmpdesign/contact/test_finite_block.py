@@ -14,8 +14,7 @@ from cmpdesign import build_layout
 from cmpdesign.contact import Ball, ContactError, Elastomer, Motion, solve
 from cmpdesign.contact.finite_block import make_gel
 from cmpdesign.design.design import load_design
-from extractor import Reference
-from extractor.contact import ContactReader, ForceModel, Gel
+from extractor import ContactReader, ForceModel, Gel, Reference
 
 LAYER = Elastomer(3.0, 0.3, 0.5, 0.5)
 

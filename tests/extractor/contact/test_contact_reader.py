@@ -13,9 +13,16 @@ from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.finite_block import make_gel
 from cmpdesign.design.design import load_design
-from extractor import Reference
-from extractor.contact import ContactForce, ContactReader, ContactReason, ForceModel, Gel, load_gel
-from extractor.errors import GelError
+from extractor import (
+    ContactForce,
+    ContactReader,
+    ContactReason,
+    ForceModel,
+    Gel,
+    GelError,
+    Reference,
+    load_gel,
+)
 
 Array = NDArray[np.float64]
 YOUNG_MPA = 0.3
