@@ -120,7 +120,9 @@ class ContactReader:
                 f"displacement_mm {np.shape(displacement_mm)} and cov_mm2 {np.shape(cov_mm2)}; expected "
                 f"({count}, 3) and ({count}, 3, 3): one displacement and its covariance for every marker"
             )
-        known = np.isfinite(displacement_mm).all(axis=1) & np.isfinite(cov_mm2).all(axis=(1, 2))
+        known = np.asarray(
+            np.isfinite(displacement_mm).all(axis=1) & np.isfinite(cov_mm2).all(axis=(1, 2)), np.bool_
+        )
         present = max(int(self.layout.present.sum()), 1)
         if known.sum() < self.model.fewest_known * present:
             self._support = None
