@@ -5,15 +5,13 @@ PYTHON ?= python3
 # The versions that the tests ran with; "make setup LOCK=" takes the newest that pyproject.toml allows.
 LOCK ?= requirements.lock
 BIN := .venv/bin
+# The base environment, what tests and documentation need besides, and the native modules.
+BASE := .venv/.base
 READY := .venv/.ready
 CORE := .venv/.core
 SOURCES := $(wildcard cmake/CMakeLists.txt extractor/native/* extractor/native/*/* extractor/native/*/*/* cmpdesign/native/*)
-# setuptools and wheel: packages without a wheel of their own are built here, too
-BUILD_NEEDS := scikit-build-core nanobind cmake ninja setuptools wheel
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(LOCK),--constraint $(LOCK))
 ifeq ($(shell command -v $(CXX) || command -v g++ || command -v clang++),)
-  ZIG := ziglang
-  TOOLCHAIN := CMAKE_TOOLCHAIN_FILE=$(CURDIR)/cmake/zig.cmake
+  ZIG := --zig
 endif
 
 .PHONY: help setup demo test test-all test-sanitized lint bench figures docs lock wheel clean
@@ -28,34 +26,27 @@ help:
 	@echo "make bench     every figure that the documentation states"
 	@echo "make figures   every picture and generated page of docs/"
 	@echo "make docs      the documentation as a site, links checked (build/site)"
-	@echo "make setup     .venv with everything, in the versions of requirements.lock (the others call it)"
+	@echo "make setup     .venv with everything, in the versions of requirements.lock; demo makes the smaller part that it needs"
 	@echo "make lock      requirements.lock anew, from what is installed in .venv"
 
 setup: $(READY) $(CORE)
 
-$(READY): pyproject.toml $(LOCK)
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+$(BASE): pyproject.toml $(LOCK)
+	@$(PYTHON) -c 'import tomllib' 2>/dev/null || \
 	  { echo "error: $(PYTHON) is missing or older than 3.11; call make PYTHON=/path/to/python3.11" >&2; exit 1; }
-	@$(PYTHON) -c 'import os, sysconfig as s; os.stat(s.get_path("include") + "/Python.h")' 2>/dev/null || \
-	  { echo "error: the headers of $(PYTHON) are missing; on Debian: apt install python3-dev" >&2; exit 1; }
-	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
-	  { echo "error: $(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv" >&2; exit 1; }
-	@echo "Setting up .venv (once; some minutes) ..."
-	@$(PYTHON) -m venv .venv
-	@$(PIP) $(BUILD_NEEDS) $(ZIG)
-	@# An older .venv has another distribution of OpenCV; two in one environment overwrite each other.
-	@$(BIN)/python -m pip uninstall --quiet --yes --disable-pip-version-check opencv-python-headless 2>/dev/null
-	@$(TOOLCHAIN) PATH=$(CURDIR)/$(BIN):$$PATH $(PIP) --no-build-isolation --editable '.[dev]'
-	@# Only the path: the build backend's finder would take the packages from here also in copies of the checkout.
-	@sed -i.old '/^import /d' .venv/lib/python*/site-packages/_editable_skbc_cmpdesign.pth
+	@$(PYTHON) tools/set_up.py base --lock "$(LOCK)" $(ZIG)
 	@touch $@ $(CORE)
 
+$(READY): pyproject.toml $(LOCK) | $(BASE)
+	@$(PYTHON) tools/set_up.py dev --lock "$(LOCK)"
+	@touch $@
+
 # The native modules, where a source is newer.
-$(CORE): $(SOURCES) | $(READY)
+$(CORE): $(SOURCES) | $(BASE)
 	@PATH=$(CURDIR)/$(BIN):$$PATH cmake --build cmake
 	@touch $@
 
-demo: $(READY) $(CORE)
+demo: $(BASE) $(CORE)
 	@$(BIN)/python -m cmpdesign.demo
 
 test: $(READY) $(CORE)

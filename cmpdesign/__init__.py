@@ -8,7 +8,7 @@ Every command has its call:
     cmpdesign.verify("layout.json", "photo.png")    a verdict on a picture; extractor.Extractor reads without a verdict
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
-    cmpdesign.kerf, calibrate_camera, calibrate_pattern, run_experiment, export_lerobot, export_zarr
+    cmpdesign.kerf, laser_grid, calibrate_camera, calibrate_pattern, run_experiment, export_lerobot, export_zarr
 
 The rooms of the package, each of which imports only rooms above it, left column first:
 
@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
     from cmpdesign.api.workshop import kerf as kerf
+    from cmpdesign.api.workshop import laser_grid as laser_grid
     from cmpdesign.api.workshop import run_experiment as run_experiment
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
@@ -97,6 +98,7 @@ _HOMES = {
     "export_zarr": "cmpdesign.api.workshop",
     "extract": "cmpdesign.api.datasets",
     "kerf": "cmpdesign.api.workshop",
+    "laser_grid": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
     "load": "cmpdesign.api.designs",
     "load_run": "cmpdesign.api.sequences",

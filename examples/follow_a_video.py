@@ -2,12 +2,14 @@
 
     python examples/follow_a_video.py [layout.json video.mp4]
 
-The source may also be a folder of pictures, or a camera's number. Without arguments five pictures are drawn first.
+The source may also be a folder of pictures, or a camera's number. Without arguments five pictures are drawn
+first, into the new folder "example".
 """
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -17,15 +19,17 @@ from extractor import Tracker
 
 def draw_press(folder: str) -> str:
     """Draw a pattern that is pressed deeper in every picture; return its layout file."""
+    if Path(folder).parent.exists():
+        sys.exit("the folder example exists: rename or remove it, so that no file is overwritten")
     layout = cmpdesign.load("honeycomb", layers=5).layout
     for number in range(5):
         seen = cmpdesign.render(layout, pitch_px=30, press_mm=0.1 * number, noise=2, seed=number)
         seen.save(f"{folder}/{number}.png")
-    layout.write("layout.json")
-    return "layout.json"
+    layout.write("example/layout.json")
+    return "example/layout.json"
 
 
-def main(layout: str = "", source: str = "frames") -> None:
+def main(layout: str = "", source: str = "example/frames") -> None:
     tracker = Tracker(layout or draw_press(source))  # the first picture that is read is at rest
     for frame in cmpdesign.open_source(source, fps=30).frames():
         tracked = tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)

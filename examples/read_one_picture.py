@@ -2,12 +2,13 @@
 
     python examples/read_one_picture.py [layout.json picture.png]
 
-Without arguments a picture is drawn first.
+Without arguments a picture is drawn first, into the new folder "example".
 """
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import cv2
 
@@ -18,8 +19,11 @@ from extractor import Extractor
 def main(layout: str = "", picture: str = "") -> None:
     if not picture:
         design = cmpdesign.load("tac3d")
-        design.layout.write(layout := "layout.json")
-        cmpdesign.render(design.layout, pitch_px=22, rotation_deg=12, noise=2).save(picture := "seen.png")
+        if Path("example").exists():
+            sys.exit("the folder example exists: rename or remove it, so that no file is overwritten")
+        design.layout.write(layout := "example/layout.json")
+        picture = "example/seen.png"
+        cmpdesign.render(design.layout, pitch_px=22, rotation_deg=12, noise=2).save(picture)
     image = cv2.imread(picture)
     if image is None:
         sys.exit(f"{picture} is no picture that OpenCV reads")

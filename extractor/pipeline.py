@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -25,6 +26,7 @@ from extractor.complete.image_quality import (
 )
 from extractor.complete.repair import repair_markers
 from extractor.complete.reported_share import is_less_than_half_reported
+from extractor.complete.row_breaks import beside_row_break, find_row_break
 from extractor.complete.virtual_markers import locate_virtual_markers
 from extractor.errors import LayoutError
 from extractor.image.color import nominal_hues_deg, to_colors
@@ -230,13 +232,15 @@ class Extractor:
         """
         places, size = numbered.places, pyramid.size
         refined = stages.record("refine", self._refiner(pyramid, places, before))
-        repaired = stages.record("repair", repair_markers(refined, places, self._lattice, size))
+        repaired = repair_markers(refined, places, self._lattice, size)
+        rows = find_row_break(self._topology, repaired, size)
+        repaired = stages.record("repair", beside_row_break(rows, repaired))
         located = locate_virtual_markers(self._topology, repaired, refined.points, refined.scatter)
         virtual = stages.record("virtual", located)
         few = is_less_than_half_reported(repaired.xy_px, self.layout.xy_mm, self._lattice.present, size)
         view, cells = pyramid.level(1), self._sampled_cells
         quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined.blur_px)
-        stages.record("quality", quality)
+        quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
         markers = Markers(
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,

@@ -32,6 +32,8 @@ class Quality(FrozenRecord):
         evenness: light of the cells in the dimmest twentieth over that in the brightest, each cell relative to its
             ink. 1: even.
         edge_px: median distance of neighbouring markers, px.
+        row_fault: "torn" or "rolling shutter" where the image is broken along a row; else "".
+        row_jump_px: how far the image jumps there, px; 0 without a break.
     """
 
     blur_px: float
@@ -41,6 +43,8 @@ class Quality(FrozenRecord):
     clipping: float
     evenness: float
     edge_px: float
+    row_fault: str = ""
+    row_jump_px: float = 0.0
 
     @property
     def hints(self) -> tuple[str, ...]:
@@ -80,6 +84,16 @@ class Quality(FrozenRecord):
                 self.evenness < MIN_EVENNESS,
                 f"the light is uneven: the dimmest cells have {self.evenness:.0%} of the light of the brightest, at "
                 f"least {MIN_EVENNESS:.0%} is good; spread the light, or light from several sides",
+            ),
+            (
+                self.row_fault == "torn",
+                f"the image is torn along a row: it jumps by {self.row_jump_px:.1f} px or more; read whole frames: "
+                "fewer pixels or frames a second, or a shorter cable",
+            ),
+            (
+                self.row_fault == "rolling shutter",
+                f"the rows were taken at different times (rolling shutter): they jump by {self.row_jump_px:.1f} px; "
+                "hold camera and pattern still, or use a global shutter",
             ),
         )
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.products.laser.coupon.photo import CouponReading
+    from cmpdesign.products.laser.grid.reading import GridReading
     from extractor import LayoutLike, LearntLayout
     from extractor.presets import Preset
 
@@ -55,11 +56,49 @@ def kerf(
     from cmpdesign.products.laser.coupon.stated_response import stated_response
 
     cut_coupon = load_coupon(Path(coupon))
+    if cut_coupon.kind != "kerf":
+        raise CmpDesignError(
+            f"{coupon}: a grid of settings; give the coupon.json beside it, or call laser_grid"
+        )
     image = read_image(photo, max_pixels, gray=True)
     try:
         return read_coupon(
             cut_coupon, image, response=response, stated=stated_response(Path(photo)), face=face
         )
+    except PhotoError as error:
+        raise CmpDesignError(f"{photo}: {error}") from None
+
+
+def laser_grid(
+    coupon: str | Path,
+    photo: str | Path,
+    *,
+    response: Response | None = None,
+    max_pixels: int = MOST_PIXELS,
+) -> GridReading:
+    """Read which settings cut through, in a photo of a burnt grid, as the command ``kerf`` does with a grid.json.
+
+    >>> reading = cmpdesign.laser_grid("made/laser/grid.json", "grid.jpg")
+    >>> reading.best.name, reading.best.passes
+
+    Args:
+        coupon: the grid.json that a build wrote.
+        photo: photo or scan of the piece, with loose pieces pushed out.
+        response, max_pixels: see ``kerf``.
+
+    Raises:
+        CmpDesignError: a file that cannot be read, or a picture that does not show the grid.
+    """
+    from cmpdesign.files.images import read_image
+    from cmpdesign.products.laser.coupon.design import load_coupon
+    from cmpdesign.products.laser.coupon.picture import PhotoError
+    from cmpdesign.products.laser.grid.reading import read_grid
+
+    burnt = load_coupon(Path(coupon))
+    if burnt.kind != "grid":
+        raise CmpDesignError(f"{coupon}: a coupon for the kerf; give the grid.json beside it")
+    try:
+        return read_grid(burnt, read_image(photo, max_pixels, gray=True), response or "srgb")
     except PhotoError as error:
         raise CmpDesignError(f"{photo}: {error}") from None
 

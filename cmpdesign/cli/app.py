@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -61,8 +62,16 @@ def options(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
+    load: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Python file that registers patterns; run before the command."),
+    ] = None,
 ) -> None:
     """Options that belong to no command."""
+    if load is not None:
+        from cmpdesign.patterns import load_patterns
+
+        load_patterns(str(load))
 
 
 def main() -> None:

@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
-MOST_LINE_LETTERS = 300  # of an error or a warning
-_HEAD_LETTERS = 200  # letters before the cut; the remedy stands at the end of a line
+# Of an error or a warning: no message of the program is as long; only texts from files and arguments can be longer.
+MOST_LINE_LETTERS = 1000
+_HEAD_LETTERS = 700  # letters before the cut; the remedy stands at the end of a line
 _STARTED = time.perf_counter()
 
 

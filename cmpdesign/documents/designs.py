@@ -78,6 +78,9 @@ class SizeDocument(Document):
     rim_error_um: float
     told_apart_mm: float = Field(description="Smallest distance at which two touches can be told apart.")
     limit: str = Field(description="Limit that a finer pattern would exceed.")
+    seen_mm: tuple[float, float] = Field(description="Width and height of what all pixels see.")
+    make: Literal["laser", "mold", "print"] | None = Field(description="Product that makes the pad.")
+    next_command: str = Field(description="The command that makes the design's files.")
 
 
 class TemplatePart(Part):

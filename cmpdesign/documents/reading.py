@@ -19,6 +19,10 @@ class QualityPart(Part):
     evenness: float | None = Field(description="Evenness of the light, 0 to 1.")
     edge_px: float | None = Field(description="Median length of a gridline, px.")
     weakest_inks: tuple[str, ...]
+    row_fault: Literal["torn", "rolling shutter"] | None = Field(
+        None, description="A break of the image along a row."
+    )
+    row_jump_px: float | None = Field(None, description="How far the image jumps there, px.")
     hints: tuple[str, ...] = Field(description="Causes that limit the result, with remedies.")
 
 
@@ -106,6 +110,31 @@ class KerfDocument(Document):
     scale_px_mm: float = Field(description="Scale, px per mm.")
     fit_mm: float = Field(description="RMS residual of the coupon's marks.")
     patches: tuple[PatchPart, ...]
+
+
+class GridFieldPart(Part):
+    """One power and speed of a grid."""
+
+    name: str
+    power_percent: float
+    speed_mm_s: float
+    windows: dict[int, Literal["through", "marked", "unmarked"]] = Field(
+        description="Passes -> what is seen."
+    )
+    passes: int | None = Field(description="Fewest passes that cut through; null: none.")
+    least_depth_per_pass_mm: float | None = Field(description="Thickness over these passes.")
+    most_depth_per_pass_mm: float | None = Field(description="Null: the first window is open already.")
+
+
+class GridDocument(Document):
+    """What ``kerf`` read in the picture of a grid."""
+
+    format: Literal["cmp-grid"] = "cmp-grid"
+    version: Literal[1] = 1
+    scale_px_mm: float = Field(description="Scale, px per mm.")
+    from_back: bool = Field(description="The picture shows the sheet's back.")
+    best: str | None = Field(description="The quickest field that cuts through with a pass in reserve.")
+    fields: tuple[GridFieldPart, ...]
 
 
 class CalibratePatternDocument(Document):

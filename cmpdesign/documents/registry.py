@@ -27,7 +27,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "reconstruct": (runs.ReconstructDocument, runs.RecoverDocument),
     "dataset": (data.DatasetDocument, data.DatasetCheckDocument),
     "extract": (data.DatasetDocument,),
-    "kerf": (reading.KerfDocument,),
+    "kerf": (reading.KerfDocument, reading.GridDocument),
     "calibrate camera": (calibration.CalibrateCameraDocument,),
     "calibrate force": (reading.CalibrateForceDocument,),
     "calibrate gel": (reading.CalibrateGelDocument,),

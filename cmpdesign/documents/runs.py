@@ -130,6 +130,11 @@ class ReconstructDocument(Document):
     marker_shares: SharesPart
     lost_markers: dict[str, int] = Field(description="Why markers have no position -> number of markers.")
     sigma_um: tuple[float, ...] | None = Field(description="Median standard deviations in x, y and z.")
+    systematic_um: tuple[float, ...] | None = Field(
+        None,
+        description="Standard deviations of the largest displacement in x, y and z by [medium_deviation]; "
+        "the same error in all frames.",
+    )
     time_ms: dict[str, float]
     views: tuple[ViewPart, ...]
     model_px: float

@@ -50,6 +50,7 @@ class Finding:
         unit: the unit of both; "" for a plain number.
         remedy: the change to make.
         severity: "error" (will not work) or "warning" (works under good conditions only).
+        is_measure: the subject is a quantity with a limit; False: the subject says all, and value and limit only count.
     """
 
     subject: str
@@ -58,8 +59,11 @@ class Finding:
     unit: str
     remedy: str
     severity: Literal["error", "warning"]
+    is_measure: bool = True
 
     def __str__(self) -> str:
+        if not self.is_measure:
+            return f"{self.subject}; {self.remedy}"
         unit = f" {self.unit}" if self.unit else ""
         return f"{self.subject}: {self.value:.3g}{unit}, limit {self.limit:.3g}{unit}; {self.remedy}"
 
@@ -143,12 +147,13 @@ def _structure_findings(design: Design, layout: Layout) -> Iterator[Finding]:
     triangular = corners == 3
     if not triangular:
         yield Finding(
-            "corners of a cell (the extractor reads triangles only)",
+            "the extractor reads cells with three corners only",
             corners,
             3,
             "",
             "choose a triangular pattern; only `cmpdesign evaluate` reads the square pattern, as the baseline",
             "error",
+            is_measure=False,
         )
     if triangular and layers < 2:
         yield Finding(

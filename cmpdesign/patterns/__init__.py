@@ -11,11 +11,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from runpy import run_path
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.errors import CmpDesignError
 from cmpdesign.patterns.graphs import GraphFamily
 from cmpdesign.patterns.numbering import Ints
 
@@ -80,6 +82,26 @@ def register_pattern(
         return positions
 
     return register
+
+
+def load_patterns(path: str) -> None:
+    """Run a Python file that registers patterns, as ``--load`` does.
+
+    Raises:
+        CmpDesignError: the file cannot be run, or registers no pattern.
+    """
+    known = set(registered_patterns())
+    try:
+        run_path(path)
+    except OSError as error:
+        raise CmpDesignError(f"--load {path}: cannot be read ({error.strerror})") from None
+    except Exception as error:
+        raise CmpDesignError(f"--load {path}: {type(error).__name__}: {error}") from error
+    if known == set(_PATTERNS):
+        raise CmpDesignError(
+            f"--load {path}: no pattern is registered; decorate a function with register_pattern"
+        )
+    registered_patterns.cache_clear()
 
 
 @cache

@@ -202,6 +202,24 @@ def pads_as_made(design: Design, layout: Layout) -> tuple[list[MadePad], dict[st
     return pads, reasons
 
 
+def refusal_of(name: str, design: Design) -> str:
+    """Why a product cannot make a design's pad; "" if the product can.
+
+    Raises:
+        MissingLibraryError: a library of the product's extra is not installed.
+    """
+    from cmpdesign.layout.build import build_layout
+    from cmpdesign.libraries import MissingLibraryError
+
+    try:
+        _load(PRODUCTS[name].pad)(design, build_layout(design))
+    except MissingLibraryError:
+        raise
+    except CmpDesignError as error:
+        return str(error)
+    return ""
+
+
 def _load_maker(name: str) -> Maker:
     maker: Maker = _load(PRODUCTS[name].maker)
     return maker

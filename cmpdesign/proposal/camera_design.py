@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 from cmpdesign.api.designs import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.checks import CELL_WARNING_MM, EDGE_WARNING_PX
 from cmpdesign.patterns.graphs import MAX_LAYERS
+from cmpdesign.products.registry import USUAL_NAMES, refusal_of
 from cmpdesign.proposal.predicted_error import Imaging, PredictedError, predict_error
 from cmpdesign.units import LENGTHS_MM, parse_length_mm
 
@@ -29,7 +31,11 @@ _PITCH_DECIMALS = 4
 _TWO_NUMBERS = r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*"
 
 
-Limit = Literal["pixels", "cells", "layers", "error"]
+Limit = Literal["pixels", "cells", "layers", "error", "make"]
+Make = Literal["laser", "mold", "print"]
+# Products whose pad is seen from behind: inside a sensor the camera looks at the pad's back, through gel or base layer.
+# A print is looked at from its printed side, unless it is stuck to a gel.
+SEEN_FROM_BEHIND: tuple[Make, ...] = ("laser", "mold")
 
 
 class Sides(NamedTuple):
@@ -53,7 +59,9 @@ class Proposal:
         scale_px_per_mm: pixels in a millimetre, by the tighter of the two sides.
         pitch_px: pixels from marker to marker.
         error: predicted standard deviation per marker and axis, px.
-        limit: limit that a finer pattern would exceed: "pixels", "cells" (that can be made), "layers" or "error".
+        limit: limit that a finer pattern would exceed, of ``Limit``; "cells" that can be made, "make" of the product.
+        make: the product that makes the pad; None: not stated.
+        refusal: why the product refuses a finer pattern; empty unless ``limit`` is "make".
     """
 
     design: Design
@@ -63,6 +71,14 @@ class Proposal:
     pitch_px: float
     error: PredictedError
     limit: Limit
+    make: Make | None = None
+    refusal: str = ""
+
+    @property
+    def seen_mm(self) -> Sides:
+        """Width and height of the field that all pixels see at this scale; one side is larger than the wanted view,
+        where pixels and view differ in shape."""
+        return Sides(self.camera.width / self.scale_px_per_mm, self.camera.height / self.scale_px_per_mm)
 
     @property
     def error_um(self) -> float:
@@ -92,9 +108,14 @@ class Proposal:
             "cells": f"cells with a circle of {CELL_WARNING_MM:g} mm inside, the smallest that are made well",
             "layers": f"{MAX_LAYERS} layers, the most",
             "error": "the error that was asked for",
+            "make": f"what {self.make} makes: {self.refusal}",
         }
+        side = "back: mirrored = true" if design.mirrored else "front: mirrored = false"
         return {
             "camera": f"{self.camera} px on {self.view} mm: {self.scale_px_per_mm:.4g} px a mm",
+            "field seen": "{:.4g} x {:.4g} mm".format(*self.seen_mm),
+            "made by": self.make or "not stated; with --make laser, mold or print, build accepts the design",
+            "side seen": f"the {side}; change this line if your camera sees the other side",
             "pattern": f"{design.pattern}, {design.layers} layers",
             "pitch": f"{design.pitch_mm:g} mm = {self.pitch_px:.3g} px",
             "markers": f"{report.present_markers}",
@@ -121,14 +142,24 @@ class Proposal:
             "rim_error_um": round(self.rim_error_um, 4),
             "told_apart_mm": round(self.told_apart_mm, 4),
             "limit": self.limit,
+            "seen_mm": [round(side, 4) for side in self.seen_mm],
+            "make": self.make,
+            "next_command": self.next_command("DESIGN.toml"),
         }
 
     def to_toml(self) -> str:
         """The design's TOML file, which ``build`` takes."""
         figures = self.figures()
-        comments = [f"# {name}: {figures[name]}" for name in ("camera", "error per marker", "told apart")]
+        comments = [
+            f"# {name}: {figures[name]}" for name in ("camera", "made by", "error per marker", "told apart")
+        ]
         values = [f"{name} = {json.dumps(value)}" for name, value in self._parameters().items()]
         return "\n".join([*comments, *values]) + "\n"
+
+    def next_command(self, path: str) -> str:
+        """The command that makes the design of a TOML file."""
+        only = f" --only {USUAL_NAMES},{self.make}" if self.make else ""
+        return f"cmpdesign build {path} -o made{only}"
 
     def _parameters(self) -> dict[str, Any]:
         return {
@@ -143,7 +174,16 @@ class Proposal:
         return f"<div>{self.design.layout.to_svg().partition(chr(10))[2]}<table>{cells}</table></div>"
 
 
-_PARAMETERS = ("description", "source", "pattern", "layers", "pitch_mm", "border_mm", "rotation_deg")
+_PARAMETERS = (
+    "description",
+    "source",
+    "pattern",
+    "layers",
+    "pitch_mm",
+    "border_mm",
+    "rotation_deg",
+    "mirrored",
+)
 
 
 def size(
@@ -153,6 +193,7 @@ def size(
     *,
     blur_px: float = 1.0,
     noise: float = 2.0,
+    make: Make | None = None,
 ) -> Proposal:
     """Propose pitch and layers for a camera and its field of view, as the command ``size`` does.
 
@@ -169,44 +210,57 @@ def size(
         error: largest standard deviation of an inner marker, per axis: mm, or a text such as "0.2um".
         blur_px: sigma of the Gaussian blur of optics and pixel together.
         noise: standard deviation of the camera's noise, in 255ths.
+        make: product that makes the pad, "laser", "mold" or "print": the pattern is one that ``build`` accepts, and
+            ``mirrored`` is the side that is usually seen. None: only the limits of the camera and of cells count.
 
     Raises:
-        CmpDesignError: a value out of range, or an error that the camera cannot reach; the message states the smallest
-            error.
+        CmpDesignError: a value out of range, an error that the camera cannot reach, with the smallest error, or a view
+            on which the product makes no pattern.
     """
     pixels, seen_mm = _pixels(camera), _view_mm(view)
     imaging = Imaging(
         _within("blur_px", blur_px, 0.3, MOST_BLUR_PX, "px"),
         _within("noise", noise, 0.1, MOST_NOISE, "of 255"),
     )
+    if make is not None and make not in get_args(Make):
+        raise CmpDesignError(f"make {make}: unknown; there are {', '.join(get_args(Make))}")
     scale = min(pixels.width / seen_mm.width, pixels.height / seen_mm.height)
     finest, limit = _finest_layers(pixels, seen_mm, scale)
+    text = f"Proposed for {pixels} px on {seen_mm} mm."
+
+    def design_of(layers: int) -> Design:
+        fit = _fitting(layers, seen_mm)
+        return Design(
+            name="proposal",
+            description=text,
+            source="cmpdesign size",
+            pattern="honeycomb",
+            layers=layers,
+            pitch_mm=fit.pitch_mm,
+            border_mm=round(BORDER_PITCHES * fit.pitch_mm, _PITCH_DECIMALS),
+            rotation_deg=fit.rotation_deg,
+            **({"mirrored": True} if make in SEEN_FROM_BEHIND else {}),
+        )
 
     def predicted(layers: int) -> PredictedError:
         return predict_error(round(_fitting(layers, seen_mm).pitch_mm * scale, 3), imaging)
 
-    layers = finest
+    layers, refusal = _finest_made(make, finest, design_of) if make else (finest, "")
+    if refusal:
+        limit = "make"
     if error is not None:
         wanted_mm = _wanted_mm(error)
-        if predicted(finest).inner_px / scale > wanted_mm:
-            layers, limit = _coarser(wanted_mm * scale, finest, predicted), "error"
+        if predicted(layers).inner_px / scale > wanted_mm:
+            layers, limit = _coarser(wanted_mm * scale, layers, predicted), "error"
             if layers < FEWEST_LAYERS:
                 raise CmpDesignError(
                     _unreachable(error, pixels, seen_mm, predicted(FEWEST_LAYERS).inner_px / scale)
                 )
-    fit = _fitting(layers, seen_mm)
-    text = f"Proposed for {pixels} px on {seen_mm} mm."
-    design = Design(
-        name="proposal",
-        description=text,
-        source="cmpdesign size",
-        pattern="honeycomb",
-        layers=layers,
-        pitch_mm=fit.pitch_mm,
-        border_mm=round(BORDER_PITCHES * fit.pitch_mm, _PITCH_DECIMALS),
-        rotation_deg=fit.rotation_deg,
+    design = design_of(layers)
+    assert design.pitch_mm is not None
+    return Proposal(
+        design, pixels, seen_mm, scale, design.pitch_mm * scale, predicted(layers), limit, make, refusal
     )
-    return Proposal(design, pixels, seen_mm, scale, fit.pitch_mm * scale, predicted(layers), limit)
 
 
 class _Fit(NamedTuple):
@@ -258,6 +312,25 @@ def _finest_layers(pixels: Sides, view_mm: Sides, scale: float) -> tuple[int, Li
             return finest, "cells"
         finest += 1
     return finest, "layers"
+
+
+def _finest_made(make: Make, finest: int, design_of: Callable[[int], Design]) -> tuple[int, str]:
+    """The largest number of layers whose pad a product makes, and why it refuses one layer more ("" at ``finest``).
+
+    Raises:
+        CmpDesignError: the product makes no pad of the smallest number of layers.
+    """
+    refusal = refusal_of(make, design_of(finest))
+    if not refusal:
+        return finest, ""
+    low, high = FEWEST_LAYERS - 1, finest
+    while high - low > 1:
+        middle = (low + high) // 2
+        said = refusal_of(make, design_of(middle))
+        low, high, refusal = (low, middle, said) if said else (middle, high, refusal)
+    if low < FEWEST_LAYERS:
+        raise CmpDesignError(f"--make {make}: {FEWEST_LAYERS} layers on this view: {refusal}")
+    return low, refusal
 
 
 def _coarser(wanted_px: float, finest: int, predicted: Any) -> int:

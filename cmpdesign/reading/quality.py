@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from extractor.quality import Quality
 
-NUMBERS = ("blur_px", "noise", "contrast", "clipping", "evenness", "edge_px")
+NUMBERS = ("blur_px", "noise", "contrast", "clipping", "evenness", "edge_px", "row_jump_px")
 
 
 def quality_to_json(quality: Quality | None) -> dict[str, Any] | None:
@@ -22,6 +22,7 @@ def quality_to_json(quality: Quality | None) -> dict[str, Any] | None:
     return {
         **{name: round(value, 4) if np.isfinite(value) else None for name, value in numbers.items()},
         "weakest_inks": list(quality.weakest_inks),
+        "row_fault": quality.row_fault or None,
         "hints": list(quality.hints),
     }
 
@@ -43,9 +44,9 @@ def reasons_text(reasons: Mapping[str, int]) -> str:
     from extractor import Reason
 
     codes = set(Reason)
-    return "; ".join(
-        f"{count} x {Reason(reason).text if reason in codes else reason}" for reason, count in reasons.items()
-    )
+    texts = {code.value: code.text for code in codes}
+    texts[Reason.SEVERAL_PADS] += ", or give a rig to `reconstruct`, which reads several views of one pad"
+    return "; ".join(f"{count} x {texts.get(reason, reason)}" for reason, count in reasons.items())
 
 
 def median_quality(qualities: Sequence[Quality]) -> Quality | None:
@@ -57,4 +58,6 @@ def median_quality(qualities: Sequence[Quality]) -> Quality | None:
     if not qualities:
         return None
     medians = {name: float(np.median([getattr(q, name) for q in qualities])) for name in NUMBERS}
-    return Quality(**medians, weakest_inks=Counter(q.weakest_inks for q in qualities).most_common(1)[0][0])
+    inks = Counter(q.weakest_inks for q in qualities).most_common(1)[0][0]
+    fault = Counter(q.row_fault for q in qualities).most_common(1)[0][0]
+    return Quality(**medians, weakest_inks=inks, row_fault=fault)

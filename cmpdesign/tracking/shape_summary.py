@@ -44,6 +44,7 @@ class ShapeStatistics:
         self._lost: Counter[int] = Counter()
         self._sigmas_um: list[np.ndarray] = []
         self._largest = _LargestDisplacement()
+        self._systematic_um: list[float] | None = None
 
     @property
     def frames(self) -> int:
@@ -73,6 +74,8 @@ class ShapeStatistics:
             self._largest = _LargestDisplacement(
                 float(np.nanmax(length)), frame.index, int(np.nanargmax(length))
             )
+            if self._reconstructor.rig.medium_deviation:
+                self._systematic_um = (1e3 * shape.displacement_systematic_mm[self._largest.marker]).tolist()
 
     def to_json(self, source: str, declared: int | None, ended: str) -> dict[str, Any]:
         """The summary as JSON values, see docs/how-to/reconstruction.md.
@@ -106,6 +109,7 @@ class ShapeStatistics:
                 PointReason(code).name.lower(): count for code, count in sorted(self._lost.items()) if code
             },
             "sigma_um": sigmas,
+            "systematic_um": self._systematic_um,
             "time_ms": percentiles(self._elapsed_ms),
             "views": [
                 {"name": view.name, "position_mm": view.position_mm.tolist(), "rms_px": float(rms)}

@@ -6,7 +6,7 @@ the markers at rest; each frame is then reconstructed independently, so there is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,6 +45,8 @@ class Shape:
             the markers, by edge from its smaller id.
         virtual_cov_mm2: (E, m, 3, 3) float64.
         virtual_status: (E, m) uint8, a ``VirtualStatus`` each.
+        displacement_systematic_mm: (M, 3) float64, standard deviations of the displacements that follow from the rig's
+            ``medium_deviation``, the same error in all frames; not in the covariances. 0 where the medium is exact.
         problem: the views without a pattern, and why; empty where all views show the pattern.
     """
 
@@ -61,6 +63,7 @@ class Shape:
     virtual_displacement_mm: Array
     virtual_normals: Array
     virtual_status: NDArray[np.uint8]
+    displacement_systematic_mm: Array
     problem: str = ""
 
     @property
@@ -127,7 +130,11 @@ class Reconstructor:
         )
         self._gate_sigmas = gate_sigmas
         spread = np.broadcast_to(np.asarray(flatness_mm, np.float64), 3)
-        self.poses = self._estimate_poses(rest, (float(spread[0]), float(spread[1]), float(spread[2])))
+        spread_mm = (float(spread[0]), float(spread[1]), float(spread[2]))
+        self.poses = self._estimate_poses(rig.views, rest, spread_mm)
+        self._deviating = [
+            self._estimate_poses(views, rest, spread_mm).views for views in _deviating_views(rig)
+        ]
         self.warnings = (self.poses.warning,) if self.poses.warning else ()
         self.model_px = 0.0 if model_px is None else model_px
         flat = np.column_stack([layout.xy_mm, np.zeros(len(layout.xy_mm))])
@@ -139,6 +146,11 @@ class Reconstructor:
             self._rest = self._points(rest)
             self._require_depth(rest, self._rest)
             self.rest_xyz_mm = self._rest.xyz_mm
+        self._rest_moves_mm: Array = (
+            self._moves(rest, self.rest_xyz_mm)
+            if rest is not None
+            else np.zeros((len(self._deviating), *flat.shape))
+        )
         self._rest_virtual_mm = self._virtual(self.rest_xyz_mm)
 
     def reconstruct(self, markers: Sequence[Markers | None]) -> Shape:
@@ -172,6 +184,7 @@ class Reconstructor:
             virtual_cov_mm2=self._virtual_cov(cov, known),
             virtual_displacement_mm=virtual_mm - self._rest_virtual_mm,
             virtual_normals=self._virtual_normals(normals, known),
+            displacement_systematic_mm=self._systematic_mm(kept, points.xyz_mm),
             virtual_status=np.where(known, VirtualStatus.INTERPOLATED, VirtualStatus.LOST).astype(np.uint8),
             problem=problem,
         )
@@ -181,8 +194,20 @@ class Reconstructor:
         """(M + E m, 3) float64, the positions of all points at rest, the virtual markers last."""
         return np.concatenate([self.rest_xyz_mm, self._rest_virtual_mm.reshape(-1, 3)])
 
-    def _estimate_poses(self, rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]) -> Poses:
-        views = self.rig.views
+    def _systematic_mm(self, markers: Sequence[Markers | None], xyz_mm: Array) -> Array:
+        """(M, 3) the deviations of the displacements by all deviating media together."""
+        moved = self._moves(markers, xyz_mm) - self._rest_moves_mm
+        return np.asarray(np.where(np.isfinite(xyz_mm), np.sqrt((moved**2).sum(axis=0)), np.nan))
+
+    def _moves(self, markers: Sequence[Markers | None], xyz_mm: Array) -> Array:
+        """(K, M, 3) mm by which positions (M, 3) move with each deviating medium."""
+        if not self._deviating:
+            return np.zeros((0, *xyz_mm.shape))
+        return np.stack([self._points(markers, views=views).xyz_mm - xyz_mm for views in self._deviating])
+
+    def _estimate_poses(
+        self, views: Sequence[View], rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]
+    ) -> Poses:
         if rest is None:
             missing = [view.name for view in views if not view.placed]
             if missing:
@@ -251,19 +276,27 @@ class Reconstructor:
                 problems.append(f"{view.name}: {problem}")
         return kept, "; ".join(problems)
 
-    def _points(self, markers: Sequence[Markers | None], model_px: float | None = None) -> Points:
-        """The triangulated markers; with ``model_px``, this is the camera model's error and no misfit is rejected."""
+    def _points(
+        self,
+        markers: Sequence[Markers | None],
+        model_px: float | None = None,
+        views: Sequence[View] | None = None,
+    ) -> Points:
+        """The triangulated markers; with ``model_px``, this is the camera model's error and no misfit is rejected.
+
+        With other ``views`` than the poses', no point is rejected.
+        """
         count = len(self.layout.xy_mm)
         model_cov = np.eye(2) * (self.model_px if model_px is None else model_px) ** 2
         xy = [np.full((count, 2), np.nan) if m is None else m.xy_px for m in markers]
         cov = [np.full((count, 2, 2), np.nan) if m is None else m.cov_px2 + model_cov for m in markers]
         return triangulate(
-            self.poses.views,
+            self.poses.views if views is None else views,
             np.stack(xy),
             np.stack(cov),
             cov_pose=self.poses.cov,
-            max_sigma_mm=self._max_sigma_mm,
-            gate_sigmas=np.inf if model_px is not None else self._gate_sigmas,
+            max_sigma_mm=self._max_sigma_mm if views is None else np.inf,
+            gate_sigmas=self._gate_sigmas if model_px is None and views is None else np.inf,
         )
 
     def _inflated_covariances(self, points: Points) -> Points:
@@ -326,6 +359,17 @@ class Reconstructor:
         mixed = (1 - t) * normals[start, None] + t * normals[end, None]
         unit = mixed / np.linalg.norm(mixed, axis=2, keepdims=True)
         return np.asarray(np.where(known[..., None], unit, np.nan))
+
+
+def _deviating_views(rig: Rig) -> Iterator[tuple[View, ...]]:
+    """The views with each uncertain number of the medium larger by its standard deviation."""
+    for name, deviation in rig.medium_deviation.items():
+        changed = []
+        for view in rig.views:
+            assert view.medium is not None
+            medium = replace(view.medium, **{name: getattr(view.medium, name) + deviation})
+            changed.append(replace(view, medium=medium))
+        yield tuple(changed)
 
 
 def _has_position(markers: Markers) -> NDArray[np.bool_]:

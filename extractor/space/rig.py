@@ -18,10 +18,14 @@ gel_mm = 4.0                               # from the pattern at rest to the win
 gel_index = 1.41
 window_mm = 2.0
 window_index = 1.49
+
+[medium_deviation]                         # standard deviations of these numbers; left out: exact
+gel_mm = 0.05
 """
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -68,11 +72,16 @@ MAX_NUMBER = 1e9  # of a rig's numbers, px or mm
 class Rig:
     """A sensor's views, in the order of the file.
 
+    Attributes:
+        views: the views.
+        medium_deviation: standard deviations of the medium's numbers, by the fields of ``Medium``; absent: exact.
+
     Raises:
-        RigError: no view, or two of one name.
+        RigError: no view, two of one name, or a deviation of a number that the medium does not have.
     """
 
     views: tuple[View, ...]
+    medium_deviation: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "views", tuple(self.views))
@@ -84,11 +93,18 @@ class Rig:
                 raise RigError(
                     f"the view's name {name!r} is given {names.count(name)} times; give each view a different name"
                 )
+        deviations = {name: float(value) for name, value in self.medium_deviation.items() if value}
+        for name, value in deviations.items():
+            if not 0 < value < float("inf"):
+                raise RigError(f"medium_deviation.{name} is {value:g}; expected a number from 0")
+            if any(view.medium is None or not getattr(view.medium, name) for view in self.views):
+                raise RigError(f"medium_deviation.{name} is given, but [medium] has no {name}; give it there")
+        object.__setattr__(self, "medium_deviation", deviations)
 
     def without_poses(self) -> Rig:
         """The same views without poses, which follow from a rest frame; ``mirrored`` is kept."""
         poseless = {"R_camera_from_layout": None, "t_camera_from_layout_mm": None}
-        return Rig(tuple(replace(view, **poseless) for view in self.views))  # type: ignore[arg-type]
+        return replace(self, views=tuple(replace(view, **poseless) for view in self.views))  # type: ignore[arg-type]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,23 +143,24 @@ def parse_rig(text: str, name: str = "rig") -> Rig:
 
 def _parse_document(document: Mapping[str, Any]) -> Rig:
     for field in document:
-        if field not in ("view", "medium", *OTHER_TABLES):
-            near = nearest_name(field, ("view", "medium", *OTHER_TABLES))
+        if field not in ("view", "medium", "medium_deviation", *OTHER_TABLES):
+            near = nearest_name(field, ("view", "medium", "medium_deviation", *OTHER_TABLES))
             _raise_rig_error(shown(field), f"unknown{near}", "[[view]] tables")
     tables = document.get("view")
     if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
         raise RigError("view is missing; expected at least one [[view]] table")
     if len(tables) > MAX_VIEWS:
         _raise_rig_error("view", f"a list of {len(tables)}", f"at most {MAX_VIEWS} [[view]] tables")
-    medium = _parse_medium(document["medium"]) if "medium" in document else None
-    return Rig(tuple(_parse_view(table, index, medium) for index, table in enumerate(tables)))
+    medium = Medium(**_parse_medium_numbers(document["medium"], "medium")) if "medium" in document else None
+    deviations = _parse_medium_numbers(document.get("medium_deviation", {}), "medium_deviation")
+    return Rig(tuple(_parse_view(table, index, medium) for index, table in enumerate(tables)), deviations)
 
 
-def _parse_medium(table: object) -> Medium:
+def _parse_medium_numbers(table: object, name: str) -> dict[str, float]:
     if not isinstance(table, dict):
-        _raise_rig_error("medium", shown(table), f"a table of {', '.join(MEDIUM_FIELDS)}")
-    _require_known_fields(table, "medium.", MEDIUM_FIELDS)
-    return Medium(**{field: _parse_number(table[field], f"medium.{field}", False) for field in table})
+        _raise_rig_error(name, shown(table), f"a table of {', '.join(MEDIUM_FIELDS)}")
+    _require_known_fields(table, f"{name}.", MEDIUM_FIELDS)
+    return {field: _parse_number(table[field], f"{name}.{field}", False) for field in table}
 
 
 def _require_known_fields(table: Mapping[str, Any], prefix: str, known: tuple[str, ...]) -> None:

@@ -22,13 +22,12 @@ PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "laser.md"
 def test_the_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     commands = re.findall(r"^(?:    |\$ )cmpdesign (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    assert len(commands) == 3
+    assert len(commands) == 4
     for command in commands:
         if command.startswith("kerf"):
-            piece = load_coupon("out/laser/coupon.json")
-            cv2.imwrite(
-                "scan.png", coupon_photo(piece, {patch.name: (0.15, 0.14) for patch in piece.patches})
-            )
+            _, file, picture = shlex.split(command)
+            piece = load_coupon(file)
+            cv2.imwrite(picture, coupon_photo(piece, {patch.name: (0.15, 0.14) for patch in piece.patches}))
         result = CliRunner().invoke(app, shlex.split(command))
         assert result.exit_code == 0, f"{command}: {result.output}"
     assert (tmp_path / "out" / "laser" / "5-outline.gcode").is_file()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -14,16 +15,18 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 # What an example prints, in part, and files that it leaves.
 RUN = {
-    "read_one_picture": ("331 of 331 markers, 331 of them measured", ["layout.json", "seen.png"]),
-    "follow_a_video": ("0.133 s: marker", ["layout.json", "frames/4.png"]),
-    "my_own_pattern": ("127 of 127 markers, error 0.0", ["swirl/pattern.svg"]),
+    "read_one_picture": (
+        "331 of 331 markers, 331 of them measured",
+        ["example/layout.json", "example/seen.png"],
+    ),
+    "follow_a_video": ("0.133 s: marker", ["example/layout.json", "example/frames/4.png"]),
     "compare_designs": ("honeycomb       9      271     1.205", []),
     "size_for_my_camera": ("honeycomb, 19 layers", ["sized/layout.json"]),
     "make_a_laser_job": ("1-red.gcode", ["pad/laser/job.lbrn2", "pad/as-made/laser.json"]),
-    "plot_a_recording": ("6 frames: history.png", ["history.png", "displacement.png", "run.npz"]),
+    "plot_a_recording": ("6 frames: plotted/history.png", ["plotted/displacement.png", "plotted/run.npz"]),
 }
-# tested beside this file, and with the molds
-OTHERS = {"lerobot_camera", "ros2_node", "sensor_housing", "torch_frames"}
+# tested beside this file, with the molds, and below
+OTHERS = {"lerobot_camera", "my_own_pattern", "ros2_node", "sensor_housing", "torch_frames"}
 NOTEBOOKS = ("explore_a_design", "plot_a_recording", "compare_designs")
 MOST_LINES = 45
 
@@ -55,9 +58,59 @@ def test_an_example_takes_files(tmp_path: Path) -> None:
     run_python([EXAMPLES / "read_one_picture.py"], tmp_path)
     (tmp_path / "other").mkdir()
     printed = run_python(
-        [EXAMPLES / "read_one_picture.py", "../layout.json", "../seen.png"], tmp_path / "other"
+        [EXAMPLES / "read_one_picture.py", "../example/layout.json", "../example/seen.png"],
+        tmp_path / "other",
     )
     assert "331 of 331" in printed and list((tmp_path / "other").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["read_one_picture", "follow_a_video", "plot_a_recording"])
+def test_an_example_overwrites_no_file(name: str, tmp_path: Path) -> None:
+    """A folder of the user's with the example's name: one line, and no file changes."""
+    for folder in ("example", "plotted"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "layout.json").write_text("mine", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, EXAMPLES / f"{name}.py"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1 and "exists: rename or remove it" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert {path.read_text(encoding="utf-8") for path in tmp_path.rglob("*.*")} == {"mine"}
+
+
+def test_a_pattern_of_a_file_is_built_and_read(tmp_path: Path) -> None:
+    pattern = EXAMPLES / "my_own_pattern.py"
+    options = ["--set", "pattern=swirl", "--set", "layers=6", "-o", "swirl", "--only", "layout"]
+    words = ["-m", "cmpdesign", "--load", pattern, "build", "honeycomb", *options]
+    run_python(words, tmp_path)
+    reading = (
+        "import cmpdesign, extractor\n"
+        "layout = 'swirl/layout.json'\n"
+        "seen = cmpdesign.render(layout, pitch_px=30, noise=2)\n"
+        "markers = extractor.Extractor(layout).extract(seen.image)\n"
+        "error_px = abs(markers.xy_px - seen.truth.marker_xy_px)\n"
+        "assert (markers.status == 1).all() and error_px.max() < 0.1\n"
+    )
+    run_python(["-c", reading], tmp_path)
+
+
+@pytest.mark.slow
+def test_a_pattern_of_a_file_passes_the_tests_of_patterns(tmp_path: Path) -> None:
+    """Put where CONTRIBUTING says, in a copy of the checkout."""
+    for part in ("cmpdesign", "extractor", "tests"):
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / part, tmp_path / part, ignore=ignored)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    (tmp_path / "templates").symlink_to(ROOT / "templates")
+    shutil.copy(EXAMPLES / "my_own_pattern.py", tmp_path / "cmpdesign" / "patterns" / "swirl.py")
+    tests = [f"tests/{name}" for name in ("cmpdesign/patterns/test_patterns.py", "house/test_structure.py")]
+    words = ["-m", "pytest", "-n0", "-p", "no:cacheprovider", "-k", "swirl or order or import", *tests]
+    assert " passed" in run_python(words, tmp_path)
 
 
 @pytest.mark.slow

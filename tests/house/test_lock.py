@@ -57,5 +57,5 @@ def test_the_locked_versions_install_on_debian_12() -> None:
 
 def test_setup_and_ci_use_the_lock() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    assert "LOCK ?= requirements.lock" in makefile and "--constraint $(LOCK)" in makefile
+    assert "LOCK ?= requirements.lock" in makefile and makefile.count('--lock "$(LOCK)"') == 2
     assert "make setup LOCK=requirements.lock" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")

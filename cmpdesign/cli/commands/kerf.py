@@ -17,8 +17,9 @@ from cmpdesign.inputs.files import MOST_PIXELS
 if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.design import Coupon
     from cmpdesign.products.laser.coupon.photo import CouponReading, MeasuredWidth, PatchKerf
+    from cmpdesign.products.laser.grid.reading import FieldReading, GridReading
 
-EXAMPLES = ("cmpdesign kerf coupon.json scan.png", "cmpdesign kerf coupon.json photo.jpg --face front --json")
+EXAMPLES = ("cmpdesign kerf coupon.json scan.png", "cmpdesign kerf grid.json photo.jpg --json")
 
 
 class SeenFace(StrEnum):
@@ -29,7 +30,9 @@ class SeenFace(StrEnum):
 
 
 def kerf(
-    coupon: Annotated[Path, typer.Argument(metavar="COUPON", help="The coupon.json that build wrote.")],
+    coupon: Annotated[
+        Path, typer.Argument(metavar="COUPON", help="The coupon.json or grid.json that build wrote.")
+    ],
     photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="A photo or scan of the cut piece.")],
     face: Annotated[
         SeenFace | None,
@@ -47,12 +50,17 @@ def kerf(
     ] = None,
     max_pixels: MaxPixelsOption = MOST_PIXELS,
 ) -> None:
-    """Measure the kerf on a cut coupon, and print the lines for the material's file."""
+    """Measure the kerf on a cut coupon, or read a grid of settings, and print the lines for the material's file."""
     from cmpdesign.api import workshop
     from cmpdesign.documents.reading import KerfDocument
     from cmpdesign.products.laser.coupon.design import load_coupon
 
     cut_coupon = load_coupon(coupon)
+    if cut_coupon.kind == "grid":
+        _report_grid(
+            cut_coupon, workshop.laser_grid(coupon, photo, response=parse_reading_response(response)), photo
+        )
+        return
     reading = workshop.kerf(
         coupon,
         photo,
@@ -66,6 +74,74 @@ def kerf(
     for patch_kerf in reading.patches:
         say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
     finish(lambda: KerfDocument.model_validate(_reading_to_json(cut_coupon, reading)))
+
+
+def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
+    """Print a grid's table, and the lines for the material's file; end the command."""
+    from rich.table import Table
+
+    from cmpdesign.documents.reading import GridDocument
+
+    table = Table(box=None, pad_edge=False)
+    counts = sorted({passes for one in reading.fields for passes in one.states})
+    for heading in ("field", "power", "speed", *(f"{count} x" for count in counts), "depth a pass"):
+        table.add_column(heading, justify="left" if heading == "field" else "right")
+    for one in reading.fields:
+        windows = [one.states[count] for count in counts]
+        settings = (f"{one.power_percent:g} %", f"{one.speed_mm_s:g} mm/s")
+        table.add_row(one.name, *settings, *windows, _depth_text(one.depth_per_pass_mm))
+    say(table)
+    if reading.best is None:
+        say("\nno field cuts through with a pass in reserve: raise the power, or lower the speed")
+    else:
+        say(
+            f"\nfor the file of {grid.material}, the settings of {grid.machine}: the quickest with a pass in reserve"
+        )
+        say(_settings_lines(reading.best, photo.name), soft_wrap=True)
+    finish(lambda: GridDocument.model_validate(_grid_to_json(reading)))
+
+
+def _depth_text(depth: tuple[float, float] | None) -> str:
+    if depth is None:
+        return "not through"
+    low, high = depth
+    return f"above {low:.3g} mm" if high == float("inf") else f"{low:.3g} to {high:.3g} mm"
+
+
+def _settings_lines(one: FieldReading, photo: str) -> str:
+    """The settings that cut, with one number of passes in reserve."""
+    assert one.passes is not None
+    reserve = min(count for count in one.states if count > one.passes)
+    source = json.dumps(f"grid {one.name}, {photo}: through with {one.passes} passes", ensure_ascii=False)
+    values = {
+        "cut_power_percent": f"{one.power_percent:g}",
+        "cut_speed_mm_s": f"{one.speed_mm_s:g}",
+        "cut_passes": str(reserve),
+    }
+    return "\n".join(f"{name} = {{ value = {value}, source = {source} }}" for name, value in values.items())
+
+
+def _grid_to_json(reading: GridReading) -> dict[str, object]:
+    fields = []
+    for one in reading.fields:
+        low, high = one.depth_per_pass_mm or (None, None)
+        fields.append(
+            {
+                "name": one.name,
+                "power_percent": one.power_percent,
+                "speed_mm_s": one.speed_mm_s,
+                "windows": one.states,
+                "passes": one.passes,
+                "least_depth_per_pass_mm": low,
+                "most_depth_per_pass_mm": None if high == float("inf") else high,
+            }
+        )
+    return {
+        "scale_px_mm": round(reading.scale_px_mm, 4),
+        "from_back": reading.from_back,
+        "best": None if reading.best is None else reading.best.name,
+        "fields": fields,
+    }
 
 
 def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:

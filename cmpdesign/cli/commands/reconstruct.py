@@ -89,6 +89,10 @@ def _print_summary(done: ReconstructDocument) -> None:
         axes = zip("xyz", done.sigma_um, strict=True)
         rows["standard deviation"] = ", ".join(f"{axis} {value:.2f} um" for axis, value in axes)
     largest = done.largest_displacement
+    if done.systematic_um is not None:
+        rows["systematic deviation"] = "of the largest displacement, by [medium_deviation]: " + ", ".join(
+            f"{axis} {value:.1f} um" for axis, value in zip("xyz", done.systematic_um, strict=True)
+        )
     if largest is not None:
         rows["largest displacement"] = (
             f"{largest.mm:.4f} mm, marker {largest.marker} in frame {largest.frame}"

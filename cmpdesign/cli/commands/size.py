@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -12,7 +13,7 @@ from cmpdesign.cli.terminal import finish, printable_path, say, say_text
 
 EXAMPLES = (
     "cmpdesign size --camera 1280x960 --view 24x18mm",
-    "cmpdesign size --camera 640x480 --view 20x15mm --error 1um -o sized.toml",
+    "cmpdesign size --camera 640x480 --view 20x15mm --make mold -o sized.toml",
 )
 
 
@@ -21,6 +22,10 @@ def size(
     view: Annotated[
         str, typer.Option(metavar="WxH", help="Field of view in the pattern's plane, as in 24x18mm.")
     ],
+    make: Annotated[
+        Literal["laser", "mold", "print"] | None,
+        typer.Option(help="How the pad is made: the design is one that build accepts. [default: any way]"),
+    ] = None,
     error: Annotated[
         str | None,
         typer.Option(
@@ -40,7 +45,7 @@ def size(
     from cmpdesign.proposal import camera_design
 
     require_suffix("--output", output, [".toml"])
-    proposal = camera_design.size(camera, view, error, blur_px=blur, noise=noise)
+    proposal = camera_design.size(camera, view, error, blur_px=blur, noise=noise, make=make)
     if output is not None:
         write_file(output, proposal.to_toml())
     from rich.table import Table
@@ -51,6 +56,7 @@ def size(
     say(table)
     if output is not None:
         say(f"wrote {printable_path(output)}")
+        say_text(f"next: {proposal.next_command(shlex.quote(str(output)))}\n")
     else:
-        say_text("\n" + proposal.to_toml())
+        say_text("\n" + proposal.to_toml() + "\n# next: the same with -o sized.toml\n")
     finish(lambda: SizeDocument.model_validate(proposal.to_json()))

@@ -155,7 +155,8 @@ def reading_findings(pad: MadePad, reading: PadReading) -> list[Finding]:
     designed = seen_side(pad.nominal.mirrored)
     if reading.side_seen is not None and reading.side_seen != designed:
         subject = f"{name}: pads that show the {reading.side_seen}, but are designed to show the {designed}"
-        return [Finding(subject, 1, 0, "", "set mirrored to the side that the camera sees", "error")]
+        remedy = "set mirrored to the side that the camera sees"
+        return [Finding(subject, 1, 0, "", remedy, "error", is_measure=False)]
     remedy = f"change {cause}" if cause else "make pitch_mm larger, or use a camera with more pixels"
     if reading.share < MIN_SHARE:
         subject = f"{name}: share of markers that are measured on the pad as made"

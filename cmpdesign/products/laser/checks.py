@@ -127,6 +127,7 @@ def as_made_findings(job: LaserJob, figures: tuple[PassFigures, ...]) -> Iterato
             "",
             remedy,
             "warning",
+            is_measure=False,
         )
 
 
@@ -172,7 +173,7 @@ def _uncompensated_findings(job: LaserJob) -> Iterator[Finding]:
     if idle:
         names = " and ".join(f"laser.{name}" for name in idle)
         remedy = f"leave {names} out: without compensation (laser.kerf_mm = 0) paths are the outlines"
-        yield Finding("options without effect", len(idle), 0, "", remedy, "warning")
+        yield Finding("options without effect", len(idle), 0, "", remedy, "warning", is_measure=False)
 
 
 def _spacing_findings(job: LaserJob) -> Iterator[Finding]:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from html import escape
 
+import numpy as np
+
 from cmpdesign.layout.side import seen_side
 from cmpdesign.patterns.colors import BLACK, COLORS
 from cmpdesign.products.laser.as_made import FaceFigures, PassFigures
 from cmpdesign.products.laser.figures import PassTiming
+from cmpdesign.products.laser.formats.drawing import LaserDrawing
 from cmpdesign.products.laser.formats.laser_layers import format_mm
 from cmpdesign.products.laser.formats.svg import path_data
 from cmpdesign.products.laser.job import LaserJob, LaserPass
@@ -34,13 +37,16 @@ _CORNERS = {
 }
 
 
-def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tuple[PassTiming, ...]) -> str:
+def job_sheet_html(
+    job: LaserJob, figures: tuple[PassFigures, ...], timings: tuple[PassTiming, ...], coupon: LaserDrawing
+) -> str:
     """Format the page.
 
     Args:
         job: the job.
         figures: figures of every pass of cells.
         timings: time of every pass, in burning order.
+        coupon: the drawing of the coupon.
     """
     lines = [
         "<!doctype html>",
@@ -57,6 +63,8 @@ def job_sheet_html(job: LaserJob, figures: tuple[PassFigures, ...], timings: tup
         "<h2>As made</h2>",
         _corners_html(job),
         _as_made_html(figures),
+        "<h2>Coupon</h2>",
+        _coupon_html(coupon),
         "<h2>Registration</h2>",
         _registration_html(job),
         f"<p><small>Layout {job.layout.digest[:16]}. {escape(job.setup.material.fumes)}</small></p>",
@@ -207,6 +215,30 @@ def _polygons_svg(polygons: list, top: float, fill: str, attributes: str) -> str
         points = [f"{x:.2f} {top - y:.2f}" for x, y in polygon.tolist()]
         data.append(f"M{'L'.join(points)}Z")
     return f'<path fill="{fill}"{attributes} d="{"".join(data)}"/>'
+
+
+def _coupon_html(coupon: LaserDrawing) -> str:
+    """The coupon true to size, and what its patches are."""
+    extent = coupon.extent_mm
+    width, height = extent.right - extent.left + 2, extent.top - extent.bottom + 2
+    paths = "".join(
+        f'<path d="{data}"/>'
+        for one in coupon.passes
+        for data in path_data(one.walls.moved(np.array([1 - extent.left, 1 - extent.bottom])), height)
+    )
+    rows = "".join(
+        f"<tr><td class=box>☐</td><td>{one.name.removeprefix('patch-')}</td><td class=n>{one.power_percent:g} %</td>"
+        f"<td class=n>{one.speed_mm_s:g} mm/s</td><td class=n>{one.repeats}</td></tr>"
+        for one in coupon.passes
+        if one.name.startswith("patch-")
+    )
+    size = f'width="{width:.1f}mm" height="{height:.1f}mm" viewBox="0 0 {width:.3f} {height:.3f}"'
+    return (
+        f'<svg {size} fill="none" stroke="#1c1a18" stroke-width=".12">{paths}</svg>'
+        "<p>True to size; the arrow points up. <code>grid</code> is burnt first where power and speed are unknown: its "
+        "photograph says which field cuts through.</p><table><tr><th></th><th>Patch</th><th class=n>Power</th>"
+        f"<th class=n>Speed</th><th class=n>Times over</th></tr>{rows}</table>"
+    )
 
 
 def _as_made_html(figures: tuple[PassFigures, ...]) -> str:

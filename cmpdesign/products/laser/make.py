@@ -17,6 +17,7 @@ from cmpdesign.products.laser.formats.dxf import drawing_to_dxf
 from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
 from cmpdesign.products.laser.formats.lightburn import drawing_to_lightburn
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
+from cmpdesign.products.laser.grid.job import grid_job
 from cmpdesign.products.laser.job import make_job
 from cmpdesign.products.laser.job_sheet import job_sheet_html
 from cmpdesign.products.laser.setup import complete_setup
@@ -53,7 +54,7 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
     job = make_job(design.name, layout, complete_setup(design.laser))
     warnings = require_no_errors(setup_findings(design, job))
     require_no_errors(path_findings(job))
-    drawn = len(job.passes) + 2  # a drawing a pass, one of all, one of the coupon
+    drawn = len(job.passes) + 3  # a drawing a pass, one of all, coupon and grid
     tell(1, drawn + 3)
     figures = measure_as_made(job)
     tell(2, drawn + 3)
@@ -64,11 +65,12 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
     drawings = {laser_pass.name: all_passes.with_one_pass(laser_pass) for laser_pass in job.passes}
     drawings["job"] = all_passes
     drawings["coupon"], files[f"{FOLDER}/coupon.json"] = coupon_job(job.setup)
+    drawings["grid"], files[f"{FOLDER}/grid.json"] = grid_job(job.setup)
     for number, (name, drawing) in enumerate(drawings.items(), start=1):
         files |= {f"{FOLDER}/{name}.{suffix}": write(drawing) for suffix, write in FORMATS.items()}
         tell(2 + number, drawn + 3)
     files[f"{FOLDER}/as-made.svg"] = as_made_svg(job)
-    files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(job, figures, timings)
+    files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(job, figures, timings, drawings["coupon"])
     made = ProductFiles(files, job_figures(job, figures, timings), warnings, made_pad=made_pad(job))
     tell(drawn + 3, drawn + 3)
     return made

@@ -17,7 +17,7 @@ from cmpdesign.products.mesh.three_mf import meshes_to_3mf
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.checks.findings import check_mold, require_no_errors
 from cmpdesign.products.mold.finish import MoldError
-from cmpdesign.products.mold.job_sheet import job_sheet_html
+from cmpdesign.products.mold.job_sheet import bill_of_materials, process_sheet
 from cmpdesign.products.mold.made_pad import made_pad
 from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
@@ -27,6 +27,9 @@ from cmpdesign.products.mold.solids.loops import bounding_boxes
 from cmpdesign.products.mold.solids.slab_shells import make_slab_solid, slab_volume_mm3
 from cmpdesign.products.mold.solids.tessellate import chorded_slab, tessellate_solid
 from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
+from cmpdesign.products.process_sheet.html import sheet_to_html
+from cmpdesign.products.process_sheet.pdf import sheet_to_pdf
+from cmpdesign.products.process_sheet.steps import materials_csv
 from cmpdesign.products.registry import ProductFiles
 
 FOLDER = "mesh"
@@ -45,7 +48,7 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
         DesignError: the mold cannot be made.
         MoldError: a mesh is open, inconsistently wound or of another volume than computed.
     """
-    require_libraries("cad", "OCP", "trimesh", "lib3mf", "scipy")
+    require_libraries("cad", "OCP", "trimesh", "lib3mf", "scipy", "reportlab")
     stack = make_stack(design, layout)
     findings = check_mold(stack)
     require_no_errors(findings)
@@ -65,8 +68,12 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     files[f"{FOLDER}/pad.glb"] = meshes_to_glb(pad, OPACITY)
     files[f"{FOLDER}/pad.3mf"] = meshes_to_3mf(pad, f"{design.name} pad")
     pictures = mold_pictures(parts, mold)
-    files |= {f"{FOLDER}/pictures/{name}.png": to_png(picture) for name, picture in pictures.items()}
-    files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(design.name, stack, parts, findings)
+    pngs = {name: to_png(picture) for name, picture in pictures.items()}
+    files |= {f"{FOLDER}/pictures/{name}.png": png for name, png in pngs.items()}
+    sheet = process_sheet(design.name, stack, parts, findings)
+    files[f"{FOLDER}/job-sheet.html"] = sheet_to_html(sheet, "pictures")
+    files[f"{FOLDER}/job-sheet.pdf"] = sheet_to_pdf(sheet, pngs)
+    files[f"{FOLDER}/materials.csv"] = materials_csv(bill_of_materials(stack, parts))
     return ProductFiles(files, figures, tuple(findings), pictures, made_pad(layout, stack))
 
 

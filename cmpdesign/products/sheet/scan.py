@@ -157,7 +157,10 @@ def _find_codes(gray: NDArray[np.uint8]) -> Iterator[tuple[SheetKey, Points]]:
                 if factor == 1
                 else cv2.resize(region.gray, None, fx=factor, fy=factor, interpolation=area)
             )
-            text, corners, _ = detector.detectAndDecode(reduced)
+            try:
+                text, corners, _ = detector.detectAndDecode(reduced)
+            except cv2.error:  # raised for some ordinary pictures, as where corners lie on a line
+                continue
             key = parse_key(text) if text else None
             if key is not None and corners is not None:
                 # From pixel centres of the reduced region to those of the whole picture.

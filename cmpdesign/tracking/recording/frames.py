@@ -158,6 +158,7 @@ def _views_in(view: int | None, base: str, about: Columns) -> Iterator[CameraVie
         yield CameraView(base, Lens())
     for k in range(len(names)) if view is None else [view]:
         lens = Lens(*(about[f"view_{name}"][k].tolist() for name in Lens._fields))
+        lens = lens._replace(distortion=[value for value in lens.distortion if np.isfinite(value)])
         is_one_of_many = view is None and len(names) > 1
         yield CameraView(f"{base}/{_topic_name(names[k])}" if is_one_of_many else base, lens)
 

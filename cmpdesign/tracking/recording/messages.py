@@ -17,6 +17,10 @@ OK, WARN, ERROR = 0, 1, 2  # levels of a DiagnosticStatus
 _DATATYPES = {"uint8": 2, "uint32": 6, "float32": 7}
 
 
+# ROS' names of the lenses, by the number of their coefficients.
+DISTORTION_MODELS = {4: "equidistant", 5: "plumb_bob", 8: "rational_polynomial", 12: "rational_polynomial"}
+
+
 class Stamp(NamedTuple):
     """A message's time in ns, and the coordinate frame of its content."""
 
@@ -104,7 +108,7 @@ class Messages:
             header=self._header(stamp),
             height=size_px[1],
             width=size_px[0],
-            distortion_model="plumb_bob" if fx else "",
+            distortion_model=DISTORTION_MODELS[len(lens.distortion)] if fx else "",
             d=np.array(lens.distortion, np.float64),
             k=k.ravel(),
             r=(np.eye(3) if fx else np.zeros((3, 3))).ravel(),

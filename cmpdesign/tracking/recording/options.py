@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.texts import visible
@@ -90,9 +91,17 @@ class RecordedTable:
             "view_names": np.array([view.name for view in views], "U100"),
             "view_focal_px": np.array([view.focal_px for view in views], np.float64).reshape(-1, 2),
             "view_centre_px": np.array([view.centre_px for view in views], np.float64).reshape(-1, 2),
-            "view_distortion": np.array([view.distortion for view in views], np.float64).reshape(-1, 5),
+            "view_distortion": _padded([view.distortion for view in views]),
             "view_area_px": np.array(areas, np.int64).reshape(-1, 4),
         }
+
+
+def _padded(rows: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+    """(V, K) of rows of at most K numbers, with NaN at their ends."""
+    out = np.full((len(rows), max(map(len, rows), default=5)), np.nan)
+    for filled, row in zip(out, rows, strict=True):
+        filled[: len(row)] = row
+    return out
 
 
 def _qualities_of(frame: Any) -> list[Quality | None]:

@@ -32,9 +32,7 @@ def test_a_template_builds_without_a_finding_and_names_its_source(name: str) -> 
     assert "assumed" in design.source
     subjects = [finding.subject for finding in check_design(design, build_layout(design))]
     # The baseline is not read by the extractor.
-    assert subjects == (
-        ["corners of a cell (the extractor reads triangles only)"] if name == "square" else []
-    )
+    assert subjects == (["the extractor reads cells with three corners only"] if name == "square" else [])
 
 
 @pytest.mark.parametrize("name", NAMES)

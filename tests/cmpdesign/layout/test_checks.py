@@ -103,7 +103,9 @@ def test_the_report_file_carries_figures_and_findings() -> None:
     )
     assert (document["format"], document["version"]) == ("cmp-report", 1)
     assert document["present_markers"] < document["markers"]
-    assert {"subject", "value", "limit", "unit", "remedy", "severity"} == set(document["findings"][0])
+    assert {"subject", "value", "limit", "unit", "remedy", "severity", "is_measure"} == set(
+        document["findings"][0]
+    )
     assert document["findings"][0]["severity"] == "error"
 
 

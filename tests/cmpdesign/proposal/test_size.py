@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import shlex
 import tomllib
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 import cmpdesign
+from cmpdesign.products.registry import pads_as_made
 from extractor import Extractor
 from tests.support.command import refused, run
 
@@ -87,6 +90,36 @@ def test_a_period_above_the_stated_distance_is_resolved_in_every_direction() -> 
     assert any(
         np.linalg.norm(shorter - np.array(step) @ reciprocal) < np.linalg.norm(shorter) for step in steps
     )
+
+
+@pytest.mark.parametrize("make", ["mold", "print"])
+def test_the_product_makes_what_is_proposed_for_it(make: Literal["mold", "print"]) -> None:
+    """On this view the finest pattern that the camera reads has stencil holes that no mold can have."""
+    proposal = cmpdesign.size("640x480", "12x12mm", make=make)
+    design = proposal.design
+    assert make not in pads_as_made(design, design.layout)[1]
+    assert design.mirrored == (make == "mold")
+    if make == "mold":
+        assert "stencil" in proposal.refusal and proposal.limit == "make"
+        finest = cmpdesign.size("640x480", "12x12mm").design
+        assert finest.layers is not None and design.layers is not None and finest.layers > design.layers
+        assert "stencil" in pads_as_made(finest, finest.layout)[1]["mold"]
+
+
+def test_the_field_that_all_pixels_see_is_stated() -> None:
+    """24 px a mm by the shorter side, so that 640 px see 26.67 mm."""
+    result = run("size", "--camera", "640x480", "--view", "20x20mm")
+    assert "26.67 x 20 mm" in result.stdout
+    assert cmpdesign.size("640x480", "20x20mm").seen_mm == pytest.approx((640 / 24, 20))
+
+
+def test_the_next_command_builds_the_design(tmp_path: Path) -> None:
+    path = tmp_path / "my pad.toml"
+    words = ("--camera", "320x240", "--view", "30x30mm", "--make", "print", "-o", path)
+    said = run("size", *words).stdout.replace("\n", " ").partition("next: cmpdesign ")[2]
+    command = [tmp_path / "made" if word == "made" else word for word in shlex.split(said)]
+    assert run(*command).exit_code == 0
+    assert (tmp_path / "made" / "print").is_dir()
 
 
 def test_build_takes_what_size_writes(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """The coupon: a test piece; the kerf is measured from the widths of its openings.
 
 o                 o        o: fiducials, cut round; their centres do not depend on the kerf
-  [] |   [] |   [] |       []: square; |, -: narrow slots; the beam's centre runs along the nominal outlines,
+  [] |   [] |   [] |       []: square; |, -: narrow slots, and the patch's name; the beam runs along the outlines,
    -      -      -         so each opening is one kerf wider than nominal
   [] |   [] |   [] |       columns: power; rows: repeats
    -      -      -
@@ -35,6 +35,7 @@ SQUARE_MM, SLOT_MM, SLOT_LENGTH_MM = 3.0, 0.3, 4.0
 PATCH_MM, MARGIN_MM = (11.0, 10.0), 5.0
 FIDUCIAL_MM, KEY_MM = 3.0, 7.0
 TRIANGLE_MM = 1.5
+LABEL_MM = 2.0
 _MAX_BYTES = 1 << 20
 
 Face = Literal["front", "back"]
@@ -74,6 +75,7 @@ class Coupon:
         fiducials_mm: (x, y) of the lower left, lower right, upper left and upper right fiducial, and of the fifth,
             right of the first.
         patches: the patches.
+        kind: "kerf": openings that show the kerf. "grid": squares that show which settings cut through.
     """
 
     machine: str
@@ -84,6 +86,7 @@ class Coupon:
     fiducial_diameter_mm: float
     fiducials_mm: tuple[tuple[float, float], ...]
     patches: tuple[Patch, ...]
+    kind: Literal["kerf", "grid"] = "kerf"
 
     @property
     def narrowing_mm(self) -> float:
@@ -189,6 +192,7 @@ class _CouponFile(_StrictModel):
     fiducial_diameter_mm: float = Field(gt=0, le=100)
     fiducials_mm: list[tuple[float, float]] = Field(min_length=5, max_length=5)
     patches: list[_PatchFile] = Field(min_length=1, max_length=100)
+    kind: Literal["kerf", "grid"] = "kerf"
 
 
 def _parse_coupon(document: Any) -> Coupon:
@@ -212,4 +216,5 @@ def _parse_coupon(document: Any) -> Coupon:
         fiducial_diameter_mm=data.fiducial_diameter_mm,
         fiducials_mm=tuple(data.fiducials_mm),
         patches=patches,
+        kind=data.kind,
     )

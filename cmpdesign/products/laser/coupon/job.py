@@ -1,13 +1,15 @@
-"""The coupon's job: one pass for each patch, for the fiducials and for the row of triangles, on the machine's bed."""
+"""The coupon's job: a pass for each patch, for labels, fiducials and the row of triangles, on the machine's bed."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from cmpdesign.products.laser.coupon.design import (
     KERFS_MM,
+    LABEL_MM,
     MARGIN_MM,
     PATCH_MM,
     TRIANGLE_MM,
@@ -19,8 +21,10 @@ from cmpdesign.products.laser.coupon.design import (
 from cmpdesign.products.laser.formats.drawing import LaserDrawing
 from cmpdesign.products.laser.formats.laser_layers import LASER_LAYERS
 from cmpdesign.products.laser.job import CIRCLE_POINTS, LaserPass
+from cmpdesign.products.laser.library import settings_on
 from cmpdesign.products.laser.paths.beam import BeamFootprint, Points
 from cmpdesign.products.laser.paths.cavities import make_cavities
+from cmpdesign.products.laser.paths.labels import arrow_paths, label_paths
 from cmpdesign.products.laser.paths.strokes import Strokes, loop_strokes
 from cmpdesign.products.laser.setup import LaserSetup
 
@@ -28,28 +32,47 @@ from cmpdesign.products.laser.setup import LaserSetup
 def coupon_job(setup: LaserSetup) -> tuple[LaserDrawing, str]:
     """The coupon's drawing, and the text of ``coupon.json``."""
     coupon = design_coupon(setup)
+    cut = (setup.cut_power_percent, setup.cut_speed_mm_s, setup.cut_repeats)
     passes = [
-        _make_pass(f"patch-{patch.name}", _opening_strokes(patch), setup, patch.power_percent, patch.passes)
-        for patch in coupon.patches
+        label_pass(setup, _label_segments(coupon)),
+        make_pass("fiducials", fiducial_strokes(coupon), *cut),
+        *(
+            make_pass(
+                f"patch-{patch.name}",
+                _opening_strokes(patch),
+                patch.power_percent,
+                patch.speed_mm_s,
+                patch.passes,
+            )
+            for patch in coupon.patches
+        ),
+        make_pass("kerf-row", _triangle_strokes(coupon), *cut),
     ]
-    passes.insert(
-        0,
-        _make_pass("fiducials", _fiducial_strokes(coupon), setup, setup.cut_power_percent, setup.cut_repeats),
-    )
-    passes.append(
-        _make_pass("kerf-row", _triangle_strokes(coupon), setup, setup.cut_power_percent, setup.cut_repeats)
-    )
+    return placed_drawing(f"coupon for {setup.material.name}", coupon, setup, passes), coupon_to_json(coupon)
+
+
+def placed_drawing(name: str, coupon: Coupon, setup: LaserSetup, passes: Sequence[LaserPass]) -> LaserDrawing:
+    """Passes in the frame of a test piece, centred on the bed."""
     origin = _coupon_origin_mm(coupon, setup)
     moved = tuple(replace(laser_pass, walls=laser_pass.walls.moved(origin)) for laser_pass in passes)
-    drawing = LaserDrawing(
-        name=f"coupon for {setup.material.name}",
+    return LaserDrawing(
+        name=name,
         setup=setup,
         passes=moved,
-        laser_layers={laser_pass.name: layer for laser_pass, layer in zip(moved, LASER_LAYERS, strict=True)},
+        laser_layers={laser_pass.name: layer for laser_pass, layer in zip(moved, LASER_LAYERS, strict=False)},
         fiducials_mm=np.array(coupon.fiducials_mm) + origin,
         fiducial_diameter_mm=coupon.fiducial_diameter_mm,
     )
-    return drawing, coupon_to_json(coupon)
+
+
+def label_pass(setup: LaserSetup, segments: Points) -> LaserPass:
+    """(N, 2, 2) segments as a pass that marks every sheet: burnt as the material's pockets are, else as its cuts."""
+    settings = settings_on(setup.material, setup.options.machine)
+    pocket = (settings.pocket_power_percent, settings.pocket_speed_mm_s)
+    if pocket[0] is None or pocket[1] is None:
+        pocket = (settings.cut_power_percent, settings.cut_speed_mm_s)
+    strokes = loop_strokes(segments, np.arange(len(segments)))
+    return make_pass("labels", strokes, pocket[0].value, pocket[1].value, 1)  # type: ignore[union-attr]
 
 
 def _coupon_origin_mm(coupon: Coupon, setup: LaserSetup) -> Points:
@@ -59,7 +82,8 @@ def _coupon_origin_mm(coupon: Coupon, setup: LaserSetup) -> Points:
     return np.asarray(np.round((bed - marks.max(axis=0)) / 2, 3))
 
 
-def _make_pass(name: str, walls: Strokes, setup: LaserSetup, power_percent: float, repeats: int) -> LaserPass:
+def make_pass(name: str, walls: Strokes, power_percent: float, speed_mm_s: float, repeats: int) -> LaserPass:
+    """A pass of a test piece."""
     return LaserPass(
         name=name,
         kind="coupon",
@@ -68,9 +92,19 @@ def _make_pass(name: str, walls: Strokes, setup: LaserSetup, power_percent: floa
         walls=walls,
         fills=(),
         power_percent=power_percent,
-        speed_mm_s=setup.cut_speed_mm_s,
+        speed_mm_s=speed_mm_s,
         repeats=repeats,
     )
+
+
+def _label_segments(coupon: Coupon) -> Points:
+    """The patches' names, and an arrow to the top of the picture."""
+    names = [
+        label_paths(patch.name, patch.openings[1].x_mm - 1.2, patch.openings[2].y_mm - 1.6, LABEL_MM)
+        for patch in coupon.patches
+    ]
+    right, top = coupon.fiducials_mm[3]
+    return np.concatenate([*names, arrow_paths(right / 2, top - 2.0, 4.0)])
 
 
 def _opening_strokes(patch: Patch) -> Strokes:
@@ -83,7 +117,7 @@ def _opening_strokes(patch: Patch) -> Strokes:
     return loop_strokes(np.array(rows), np.arange(len(rows)))
 
 
-def _fiducial_strokes(coupon: Coupon) -> Strokes:
+def fiducial_strokes(coupon: Coupon) -> Strokes:
     """Circles without kerf compensation."""
     angle = np.linspace(0, 2 * np.pi, CIRCLE_POINTS, endpoint=False)
     circle = coupon.fiducial_diameter_mm / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cmpdesign.errors import parameter
 from cmpdesign.files.images import Image
@@ -29,6 +28,7 @@ from cmpdesign.products.laser.coupon.picture import (
     PhotoError,
     Values,
     decode_image,
+    eight_bit_gray,
     require_unclipped,
 )
 from cmpdesign.products.laser.coupon.response_fit import (
@@ -111,7 +111,7 @@ def read_coupon(
             response; the taper would close the cuts.
         ValueError: no response.
     """
-    approximate = find_fiducials(_eight_bit_gray(image), coupon)
+    approximate = find_fiducials(eight_bit_gray(image), coupon)
     reader = _CouponReader(coupon, image, approximate)
     start: Response = response if response is not None else "srgb"
     first = reader.fit(start)
@@ -160,11 +160,6 @@ class _CouponReader:
         return KerfsInLight(
             np.stack([one.value_mm for one in fits]), np.stack([one.sigma_mm for one in fits])
         )
-
-
-def _eight_bit_gray(image: Image) -> NDArray[np.uint8]:
-    gray = image.mean(axis=2) / (257.0 if image.dtype == np.uint16 else 1.0)
-    return np.asarray(np.rint(gray), dtype=np.uint8)
 
 
 def _check_picture(coupon: Coupon, image: Image, fit: FiducialFit) -> None:

@@ -74,6 +74,12 @@ def decode_image(image: Image, light_of_value: Values, exponent: float = 1.0) ->
     return np.asarray((channels[0] + channels[1] + channels[2]) / 3, dtype=np.float32)
 
 
+def eight_bit_gray(image: Image) -> NDArray[np.uint8]:
+    """(H, W) the mean of the channels, in steps of 8 bits."""
+    gray = image.mean(axis=2) / (257.0 if image.dtype == np.uint16 else 1.0)
+    return np.asarray(np.rint(gray), dtype=np.uint8)
+
+
 def require_unclipped(image: Image, to_image: PointMap, points_mm: Values, what: str) -> None:
     """Refuse a picture in which pixels at (N, 2) points of the coupon lie at an end of the values.
 

@@ -19,7 +19,7 @@ class LaserLayer:
     aci: int
 
 
-# Palette of LightBurn: https://docs.lightburnsoftware.com, colors 00 to 07, tool layer T1 (index 30).
+# Palette of LightBurn: https://docs.lightburnsoftware.com, colors 00 to 11, tool layer T1 (index 30).
 LASER_LAYERS = (
     LaserLayer(0, 0x000000, 7),
     LaserLayer(1, 0x0000FF, 5),
@@ -29,6 +29,10 @@ LASER_LAYERS = (
     LaserLayer(5, 0xFF8000, 30),
     LaserLayer(6, 0x00E0E0, 4),
     LaserLayer(7, 0xFF00FF, 6),
+    LaserLayer(8, 0xB4B4B4, 9),
+    LaserLayer(9, 0x0000A0, 174),
+    LaserLayer(10, 0xA00000, 14),
+    LaserLayer(11, 0x00A000, 94),
 )
 TOOL_LAYER = LaserLayer(30, 0xF36926, 30)
 _LAYER_OF_COLOR = {"red": 2, "green": 3, "blue": 1, "white": 4}

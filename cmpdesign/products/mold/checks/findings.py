@@ -207,7 +207,7 @@ def _sheet_findings(stack: MoldStack) -> Iterator[Finding]:
         yield Finding("mold.vent_mm", option.vent_mm, min_feature_mm(stack), "mm", remedy, "error")
     if not option.vents:
         remedy = "give the lid vents, or pour in a vacuum: air stays under the lid"
-        yield Finding("mold.vents", 0, 1, "", remedy, "warning")
+        yield Finding("no vents: mold.vents = false", 0, 1, "", remedy, "warning", is_measure=False)
     for field in ("wall_mm", "floor_mm", "plate_mm"):
         least = 2 * limit if field != "floor_mm" else 1.5
         if getattr(option, field) < least:
@@ -230,7 +230,7 @@ def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
             by_remedy.setdefault(silicone.remedy, []).append(f"{name}: {silicone.name}")
     for remedy, names in by_remedy.items():
         subject = f"layers that may not cure on {tool} ({'; '.join(names)})"
-        yield Finding(subject, len(names), 0, "", remedy, "warning")
+        yield Finding(subject, len(names), 0, "", remedy, "warning", is_measure=False)
     silicone_layers = list(zip(SILICONE_LAYERS, stack.silicones, strict=True))
     for (lower_name, lower), (upper_name, upper) in pairwise(silicone_layers):
         # According to the makers, silicones of different chemistry do not cure against each other.
@@ -239,7 +239,7 @@ def _curing_findings(stack: MoldStack) -> Iterator[Finding]:
                 f"{lower.cure}-cured layers ({lower_name}: {lower.name}) under a {upper.cure}-cured one "
                 f"({upper_name}: {upper.name})"
             )
-            yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error")
+            yield Finding(subject, 1, 0, "", "use one chemistry for all layers", "error", is_measure=False)
     scales = [silicone.scale for silicone in stack.silicones]
     reach = float(np.hypot(*stack.outline_mm.T).max())
     mismatch = (max(scales) - min(scales)) * reach
@@ -254,11 +254,13 @@ def _side_findings(stack: MoldStack) -> Iterator[Finding]:
     base = stack.silicones[0]
     if base.clear is None:
         remedy = "add clear = { value = true, source = ... } to its file if light passes through it"
-        yield Finding(f"base silicone of unknown clarity ({base.name})", 1, 0, "", remedy, "warning")
+        subject = f"base silicone of unknown clarity ({base.name})"
+        yield Finding(subject, 1, 0, "", remedy, "warning", is_measure=False)
     elif not base.clear.value:
         clear = ", ".join(name for name in silicones() if _is_clear(name))
         remedy = f"the camera looks at the pattern through the base layer: set mold.base_silicone to {clear}"
-        yield Finding(f"base silicone that is not clear ({base.name})", 1, 0, "", remedy, "error")
+        subject = f"base silicone that is not clear ({base.name})"
+        yield Finding(subject, 1, 0, "", remedy, "error", is_measure=False)
 
 
 def _is_clear(name: str) -> bool:
@@ -270,7 +272,8 @@ def _shape_findings(stack: MoldStack) -> Iterator[Finding]:
     option = stack.options
     if stack.crown is not None and stack.layout.cell_corners.shape[1] != 3:
         remedy = "choose a triangular pattern, or make the pad flat"
-        yield Finding("corners of a cell on a crown (four are in no plane)", 4, 3, "", remedy, "error")
+        subject = "corners of a cell on a crown (four are in no plane)"
+        yield Finding(subject, 4, 3, "", remedy, "error", is_measure=False)
     wall = moat_to_pin_mm(stack)
     if wall < LEAST_WALL_MM:
         remedy = "make fiducials.gap_mm larger, or mold.parting_mm or mold.moat_mm smaller"
@@ -309,7 +312,8 @@ def _unused_option_findings(stack: MoldStack) -> Iterator[Finding]:
         if option.crown_radius_mm is not None:
             yield Finding("mold.crown_radius_mm", option.crown_radius_mm, 0.0, "mm", remedy, "warning")
         if "projection" in option.model_fields_set and option.projection != "equidistant":
-            yield Finding(f'mold.projection = "{option.projection}"', 1, 0, "", remedy, "warning")
+            subject = f'mold.projection = "{option.projection}"'
+            yield Finding(subject, 1, 0, "", remedy, "warning", is_measure=False)
         return
     edge = crown_edge_mm(option, layout)
     if edge > layout.border_mm:
@@ -318,7 +322,13 @@ def _unused_option_findings(stack: MoldStack) -> Iterator[Finding]:
     if "clip" in layout.parameters:
         subject = f"clip outlines of a pad whose edge follows its crown ({option.crown})"
         yield Finding(
-            subject, 1, 0, "", "only cells are clipped; leave clip out to keep all cells", "warning"
+            subject,
+            1,
+            0,
+            "",
+            "only cells are clipped; leave clip out to keep all cells",
+            "warning",
+            is_measure=False,
         )
 
 

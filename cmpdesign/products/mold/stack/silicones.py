@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -18,6 +18,13 @@ from cmpdesign.products.laser.library import Sourced
 
 Share = Annotated[float, Field(ge=0, lt=10)]
 Positive = Annotated[float, Field(gt=0, le=1e6)]
+Loss = Annotated[float, Field(ge=0, le=500)]
+Celsius = Annotated[float, Field(gt=23, le=300)]
+
+
+def _assumed(value: Any) -> Any:
+    """The default of a field that a file leaves out."""
+    return Sourced(value=value, source="assumed: the file leaves it out")
 
 
 class Silicone(BaseModel):
@@ -27,7 +34,13 @@ class Silicone(BaseModel):
         name: name of the product.
         cure: the chemistry; tin and platinum silicones do not cure against each other.
         shrinkage_percent: linear shrinkage after full cure.
-        density_g_cm3, pot_life_min, cure_h: values at room temperature, for the job sheet.
+        density_g_cm3, pot_life_min, cure_h: values at room temperature, for the process sheet.
+        parts_a_b: masses of A and B that are mixed, in any unit.
+        pigment_percent: mass of pigment paste over that of A and B, where a layer has a color.
+        retarder_percent, thickener_percent: the same for the black layer, which must stay a dough while it is embossed.
+        loss_percent: silicone that stays in cups and syringes, over what is cast.
+        degas_min: time under vacuum after mixing.
+        warm_cure: pairs of a temperature in degrees Celsius and the hours of cure at it; empty: unknown.
         inhibited_by: materials of parts on which the silicone's surface stays sticky.
         remedy: remedy against the inhibition.
         clear: the camera can see through a base layer of this silicone; None: unknown.
@@ -44,6 +57,13 @@ class Silicone(BaseModel):
     inhibited_by: Sourced[tuple[Tool, ...]]
     remedy: Line
     clear: Sourced[bool] | None = None
+    parts_a_b: Sourced[tuple[Positive, Positive]] = _assumed((1.0, 1.0))
+    pigment_percent: Sourced[Share] = _assumed(2.0)
+    retarder_percent: Sourced[Share] = _assumed(1.0)
+    thickener_percent: Sourced[Share] = _assumed(2.0)
+    loss_percent: Sourced[Loss] = _assumed(30.0)
+    degas_min: Sourced[Positive] = _assumed(3.0)
+    warm_cure: Sourced[tuple[tuple[Celsius, Positive], ...]] = _assumed(())
 
     @property
     def scale(self) -> float:

@@ -113,9 +113,9 @@ def test_the_drawing_cuts_what_the_file_says() -> None:
     drawing, text = coupon_drawing(setup)
     assert text == coupon_to_json(PIECE)
     names = [one.name for one in drawing.passes]
-    assert names == ["fiducials", *(f"patch-{patch.name}" for patch in PIECE.patches), "kerf-row"]
+    assert names == ["labels", "fiducials", *(f"patch-{patch.name}" for patch in PIECE.patches), "kerf-row"]
     origin = drawing.fiducials_mm[0]
-    for patch, one in zip(PIECE.patches, drawing.passes[1:], strict=False):
+    for patch, one in zip(PIECE.patches, drawing.passes[2:], strict=False):
         assert (one.power_percent, one.repeats) == (patch.power_percent, patch.passes)
         strokes = groups_of(run_gcode(drawing_to_gcode(drawing.with_one_pass(one))))[: len(patch.openings)]
         for opening, stroke in zip(patch.openings, strokes, strict=True):

@@ -56,9 +56,9 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
     )
     assert result.exit_code == 0, result.output
     names = {path.name for path in (tmp_path / "laser").glob("[!.]*")}
-    jobs = ["0-holes", "1-red", "2-green", "3-blue", "4-white", "5-outline", "job", "coupon"]
+    jobs = ["0-holes", "1-red", "2-green", "3-blue", "4-white", "5-outline", "job", "coupon", "grid"]
     expected = {f"{job}.{suffix}" for job in jobs for suffix in ("svg", "dxf", "lbrn2", "gcode")}
-    assert names == expected | {"as-made.svg", "job-sheet.html", "coupon.json"}
+    assert names == expected | {"as-made.svg", "job-sheet.html", "coupon.json", "grid.json"}
     assert {path.name for path in tmp_path.glob("[!.]*")} == {"as-made", "laser", "report.json"}
     assert [path.name for path in (tmp_path / "as-made").iterdir()] == ["laser.json"]
     assert "assumed" in result.stderr

@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import Path
 
 import cv2
 import numpy as np
+import pypdfium2
 import pytest
 import trimesh
 
 from cmpdesign import build_layout, load
+from cmpdesign.design.templates import templates_folder
 from cmpdesign.products.mesh.picture import ABOVE, BELOW, ViewDirection, draw_meshes
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf, read_3mf
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold import meshes as product
 from cmpdesign.products.mold.finish import MoldError
-from cmpdesign.products.mold.job_sheet import job_sheet_html
+from cmpdesign.products.mold.job_sheet import bill_of_materials, process_sheet, weighings
 from cmpdesign.products.mold.meshes import make_meshes, make_part_mesh
 from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.pictures import exploded_meshes
 from cmpdesign.products.mold.stack.stack import make_stack
+from cmpdesign.products.process_sheet.html import sheet_to_html
 from cmpdesign.products.registry import ProductFiles
+
+HONEYCOMB = load("honeycomb", {"layers": "2"})
 
 
 @pytest.fixture(scope="module")
 def made() -> ProductFiles:
-    design = load("honeycomb", {"layers": "2"})
-    return make_meshes(design, build_layout(design))
+    return make_meshes(HONEYCOMB, build_layout(HONEYCOMB))
 
 
 def content(made: ProductFiles, name: str) -> bytes:
@@ -109,10 +115,8 @@ def test_crowned_meshes_are_closed(crown: str) -> None:
 def test_the_job_sheet_of_a_dome_says_nothing_of_flush() -> None:
     design = load("honeycomb", {"layers": "2", "mold.crown": "sphere", "mold.crown_radius_mm": "15"})
     stack = make_stack(design, build_layout(design))
-    page = job_sheet_html("dome", stack, make_parts(stack), [])
-    assert "flush" not in page and "wipe along the dome" in page
-    # The white cell alone would be a tenth of a milligram.
-    assert page.count("<td class=n>2.00 g</td>") == 7
+    page = sheet_to_html(process_sheet("dome", stack, make_parts(stack), []), "pictures")
+    assert "flush" not in page and "Wipe along the dome" in page
 
 
 def test_pictures_show_bosses_from_above_only() -> None:
@@ -156,12 +160,85 @@ def test_exploded_parts_lie_above_each_other_and_apart() -> None:
 def test_job_sheet_says_how_much_to_mix(made: ProductFiles) -> None:
     page = made.files["mesh/job-sheet.html"]
     assert isinstance(page, str)
-    for word in ("boss-red", "Solaris", "mm³", "exploded.png", "draw it off flush"):
+    for word in ("boss-red", "Solaris", "exploded.png", "Draw it off flush"):
         assert word in page
-    for name in (
-        f"mesh/pictures/{part}-{side}.png" for part in ("base", "lid") for side in ("above", "below")
-    ):
-        assert name.removeprefix("mesh/") in page and name in made.files
+    shown = re.findall(r'src="(.*?)"', page)
+    assert "pictures/lid-below.png" in shown and {f"mesh/{name}" for name in shown} <= set(made.files)
+
+
+def test_masses_are_those_of_the_pad_s_meshes(made: ProductFiles) -> None:
+    """The volumes of the STL files, times the density that the silicone's file states; shrinkage is below 0.4 %."""
+    stack = make_stack(HONEYCOMB, build_layout(HONEYCOMB))
+    for mix in weighings(stack):
+        (body,) = trimesh_of(content(made, f"pad-{mix.name}.stl"), "stl").values()
+        grams = body.volume * mix.silicone.density_g_cm3.value / 1000  # type: ignore[attr-defined]
+        assert mix.cast_g == pytest.approx(grams, rel=4e-3), mix.name
+
+
+def test_shares_and_losses_are_those_of_the_silicone_s_file(tmp_path: Path) -> None:
+    """A large pad, so that no least mass counts."""
+    text = (templates_folder() / "silicones" / "dragon-skin-10.toml").read_text(encoding="utf-8")
+    changes = {
+        "parts_a_b = { value = [1, 1]": "parts_a_b = { value = [10, 1]",
+        "pigment_percent = { value = 2": "pigment_percent = { value = 5",
+        "loss_percent = { value = 30": "loss_percent = { value = 50",
+    }
+    for before, after in changes.items():
+        assert text.count(before) == 1
+        text = text.replace(before, after)
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    design = load(
+        "honeycomb", {"layers": 20, "pitch_mm": "20mm", "mold.marker_silicone": str(tmp_path / "mine.toml")}
+    )
+    stack = make_stack(design, build_layout(design))
+    mixes = {mix.name: mix for mix in weighings(stack)}
+    red, black, base = mixes["red"], mixes["black"], mixes["base"]
+    assert red.a_g / red.b_g == pytest.approx(10) and red.pigment_g / (red.a_g + red.b_g) == pytest.approx(
+        0.05
+    )
+    assert red.mix_g == pytest.approx(1.5 * red.cast_g) and red.retarder_g == 0
+    assert black.retarder_g / (black.a_g + black.b_g) == pytest.approx(0.01)
+    assert base.pigment_g == 0  # the camera looks through it
+    listed = {one.item: one.amount for one in bill_of_materials(stack, make_parts(stack))}
+    assert listed["pigment paste, red"] == pytest.approx(red.pigment_g)
+    name = red.silicone.name
+    total = sum(mix.a_g for mix in mixes.values() if mix.silicone.name == name and mix.name != "cover")
+    assert listed[f"{name}, part A"] == pytest.approx(total + (mixes["cover"].a_g), rel=1e-9)
+
+
+def test_nothing_is_too_little_to_weigh() -> None:
+    """The white cell alone would be a tenth of a milligram."""
+    for mix in weighings(make_stack(HONEYCOMB, build_layout(HONEYCOMB))):
+        assert min(mix.a_g, mix.b_g) >= 1 - 1e-9
+        added = (mix.pigment_g, mix.retarder_g, mix.thickener_g)
+        assert min([mass for mass in added if mass], default=1) >= 0.1 - 1e-9
+
+
+def test_the_sheet_as_pdf_has_one_page_a_step(made: ProductFiles) -> None:
+    page = made.files["mesh/job-sheet.html"]
+    assert isinstance(page, str)
+    titles = re.findall(r"<h2>(.*?)</h2>", page)
+    document = pypdfium2.PdfDocument(content(made, "job-sheet.pdf"))
+    assert len(document) == len(titles) == 11
+    for title, one in zip(titles, document, strict=True):
+        said = one.get_textpage().get_text_range()
+        assert title in said and "* assumed" in said
+    drop = document[1].get_textpage().get_text_range()
+    assert "layers that may not cure on sla-resin" in drop.replace("\r\n", " ")
+
+
+def test_a_cure_that_the_parts_do_not_stand_is_marked() -> None:
+    design = load("honeycomb", {"layers": 2, "mold.tool": "fdm-pla"})
+    stack = make_stack(design, build_layout(design))
+    sheet = process_sheet("pla", stack, make_parts(stack), [])
+    notes = {
+        row[0]: row[2]
+        for step in sheet.steps
+        for table in step.tables
+        for row in table.rows[:2]
+        if len(row) == 3
+    }
+    assert "yields above 50" in notes["60 °C"] and notes["23 °C"] == ""
 
 
 @pytest.mark.parametrize("run", [1.0, 5.0, 20.0])
