@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from cmpdesign.api.designs import load as load
     from cmpdesign.api.designs import schema as schema
     from cmpdesign.api.designs import templates as templates
+    from cmpdesign.api.force import calibrate_force as calibrate_force
+    from cmpdesign.api.force import calibrate_gel as calibrate_gel
     from cmpdesign.api.layouts import Layout as Layout
     from cmpdesign.api.layouts import build_layout as build_layout
     from cmpdesign.api.layouts import read_layout as read_layout
@@ -87,6 +89,8 @@ _HOMES = {
     "Verifier": "cmpdesign.api.pictures",
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
+    "calibrate_force": "cmpdesign.api.force",
+    "calibrate_gel": "cmpdesign.api.force",
     "calibrate_pattern": "cmpdesign.api.workshop",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",

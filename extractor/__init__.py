@@ -17,17 +17,19 @@ The rooms (folders and modules) in their order; a room imports only rooms before
 - ``pipeline``: the stages in their order, from an image to markers. ``draw`` shows their results.
 - ``made``: places of the markers on one pad, learnt from pictures at rest.
 - ``track``: sequences of images. ``space``: surfaces from two or more views.
+- ``contact``: force, torque and regions from displacement.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from extractor.errors import ExtractorError, ImageError, LayoutError, PoseError, RestError, RigError
+from extractor.errors import ExtractorError, GelError, ImageError, LayoutError, PoseError, RestError, RigError
 from extractor.quality import Quality
 from extractor.result import Markers, Origin, Reason, Status, VirtualStatus
 
 if TYPE_CHECKING:
+    from extractor.contact import ContactForce, ContactReader, ContactReason, ForceModel, Gel, load_gel
     from extractor.layout.layout_file import LayoutLike, layout_of, load_layout, parse_layout
     from extractor.layout.reference import Reference
     from extractor.made.learning import LearntLayout, learn_layout
@@ -43,10 +45,16 @@ if TYPE_CHECKING:
     from extractor.track.tracker import FrameStatus, StartKind, Tracked, Tracker
 
 __all__ = [
+    "ContactForce",
+    "ContactReader",
+    "ContactReason",
     "Extractor",
     "ExtractorError",
     "Field",
+    "ForceModel",
     "FrameStatus",
+    "Gel",
+    "GelError",
     "ImageError",
     "LayoutError",
     "LayoutLike",
@@ -77,6 +85,7 @@ __all__ = [
     "WindowPlane",
     "layout_of",
     "learn_layout",
+    "load_gel",
     "load_layout",
     "load_rig",
     "parse_layout",
@@ -85,9 +94,14 @@ __all__ = [
 ]
 
 _HOMES = {
+    "ContactForce": "extractor.contact",
+    "ContactReader": "extractor.contact",
+    "ContactReason": "extractor.contact",
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
+    "ForceModel": "extractor.contact",
     "FrameStatus": "extractor.track.tracker",
+    "Gel": "extractor.contact",
     "LayoutLike": "extractor.layout.layout_file",
     "LearntLayout": "extractor.made.learning",
     "Medium": "extractor.space.medium",
@@ -107,6 +121,7 @@ _HOMES = {
     "WindowPlane": "extractor.space.medium",
     "layout_of": "extractor.layout.layout_file",
     "learn_layout": "extractor.made.learning",
+    "load_gel": "extractor.contact",
     "load_layout": "extractor.layout.layout_file",
     "load_rig": "extractor.space.rig",
     "parse_layout": "extractor.layout.layout_file",

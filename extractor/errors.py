@@ -25,3 +25,7 @@ class PoseError(ExtractorError, ValueError):
 
 class RestError(ExtractorError, ValueError):
     """Rest pictures from which no places can be learnt; names the picture, the value, the limit and the remedy."""
+
+
+class GelError(ExtractorError, ValueError):
+    """A gel's file that cannot be read or belongs to another pad; an elastomer without a modulus."""

@@ -153,3 +153,31 @@ class CalibratePatternDocument(Document):
     worst_picture_rms_px: float
     scatter_mm: float = Field(description="Scatter of the markers around their nominal places, per axis.")
     deviation_mm: float = Field(description="Standard deviation of a measured place, per axis.")
+
+
+class CalibrateGelDocument(Document):
+    """The result of ``calibrate gel``."""
+
+    format: Literal["cmp-calibration-gel"] = "cmp-calibration-gel"
+    version: Literal[1] = 1
+    written: str
+    digest: str = Field(description="Digest of layout and elastomer, without Young's modulus.")
+    markers: int
+    loads: int
+    thickness_mm: float
+    poisson: float
+    marker_depth_mm: float
+    margin_mm: float
+
+
+class CalibrateForceDocument(Document):
+    """The result of ``calibrate force``."""
+
+    format: Literal["cmp-calibration-force"] = "cmp-calibration-force"
+    version: Literal[1] = 1
+    young_mpa: float
+    young_sigma_mpa: float
+    bias_n: float = Field(description="Force that is read without a weight.")
+    bias_sigma_n: float
+    residual_z: float = Field(description="Residuals in stated deviations; 1 is right.")
+    weights: int = Field(description="Number of different masses.")

@@ -29,6 +29,8 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument, reading.GridDocument),
     "calibrate camera": (calibration.CalibrateCameraDocument,),
+    "calibrate force": (reading.CalibrateForceDocument,),
+    "calibrate gel": (reading.CalibrateGelDocument,),
     "calibrate pattern": (reading.CalibratePatternDocument,),
     "export lerobot": (runs.ExportDocument,),
     "export zarr": (runs.ExportDocument,),

@@ -52,6 +52,27 @@ def read_elastomer(path: Path) -> Elastomer:
     return Elastomer(lengths["thickness_mm"], 1.0, float(poisson), lengths["marker_depth_mm"])
 
 
+def read_young_mpa(path: Path) -> tuple[float, float]:
+    """Young's modulus of the same table and its deviation ``young_sigma_mpa`` (0 if not given), MPa.
+
+    Raises:
+        InputError: the file cannot be read, or is no TOML.
+        CmpDesignError: the modulus is missing, or a value is no number above 0.
+    """
+    table = _read_table(path) or {}
+    found = []
+    for name, default in (("young_mpa", None), ("young_sigma_mpa", 0.0)):
+        value = table.get(name, default)
+        good = isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < float("inf")
+        if not good or (value == 0 and default is None):
+            raise CmpDesignError(
+                f"{path}: elastomer.{name} is {value!r}; forces need Young's modulus above 0 MPa, as "
+                "`cmpdesign calibrate force` measures it"
+            )
+        found.append(float(value))
+    return found[0], found[1]
+
+
 def _length_mm(path: Path, name: str, value: object) -> float:
     try:
         length_mm = parse_length_mm(value)

@@ -7,11 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmpdesign.tracking.columns import Columns, head_columns, long_head_columns, time_columns, unknown_times
+from cmpdesign.tracking.columns import (
+    COVARIANCE,
+    FORCE_DIGITS,
+    UPPER,
+    Columns,
+    by_point,
+    force_columns,
+    force_long_form,
+    head_columns,
+    long_head_columns,
+    time_columns,
+    unknown_times,
+)
 from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
+    from extractor.contact import ContactReader
     from extractor.space.reconstruction import Reconstructor, Shape
     from extractor.space.views import ShapeFrame
 
@@ -21,8 +34,6 @@ TRIPLES = {
     "3D_Normals": ("nx", "ny", "nz"),
 }
 SURFACE = ("surface_dx_mm", "surface_dy_mm", "surface_dz_mm")  # of the touched surface above the markers
-COVARIANCE = ("xx", "xy", "xz", "yy", "yz", "zz")
-UPPER = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)
 
 
 class ShapeTable:
@@ -33,6 +44,7 @@ class ShapeTable:
         continuation: continues the markers' displacements to the touched surface, for further columns; None: not
             wanted.
         times: gives how the frames' times were found, for the shared columns.
+        contact: reads force, torque and traction, for further columns; None: not wanted.
     """
 
     _digits: Mapping[str, int] = (
@@ -51,11 +63,15 @@ class ShapeTable:
         reconstructor: Reconstructor,
         continuation: SurfaceContinuation | None = None,
         times: Callable[[], SourceTimes] = unknown_times,
+        contact: ContactReader | None = None,
     ) -> None:
         self._reconstructor, self._continuation, self._times = reconstructor, continuation, times
+        self._contact = contact
         self.digits: Mapping[str, int] = (
             dict(self._digits) if continuation is None else {**self._digits, **self._surface_digits}
         )
+        if contact is not None:
+            self.digits = {**self.digits, **FORCE_DIGITS}
 
     def batch(self, frames: Sequence[ShapeFrame]) -> Columns:
         shapes = [frame.shape for frame in frames]
@@ -73,6 +89,8 @@ class ShapeTable:
             spread = np.stack([surface.cov_mm2[:, UPPER[0], UPPER[1]] for surface in surfaces])
             columns["surface_displacement_mm"] = moved.astype(np.float32)
             columns["surface_cov_mm2"] = spread.astype(np.float32)
+        if self._contact is not None:
+            columns |= force_columns([self._contact.read_shape(s) for s in shapes])
         return columns
 
     def about(self) -> Columns:
@@ -97,6 +115,7 @@ class ShapeTable:
             "pose_misfit": np.array(poses.misfit),
             "model_px": np.array(reconstructor.model_px),
             **time_columns(self._times()),
+            **({} if self._contact is None else {"young_mpa": np.array(self._contact.young_mpa)}),
         }
 
 
@@ -125,14 +144,9 @@ def shape_long_form(columns: Columns, fixed: Columns) -> Columns:
         long[f"cov_{name}_mm2"] = columns["cov_mm2"][..., place].reshape(-1)
     if "surface_displacement_mm" in columns:
         for place, axis in enumerate(SURFACE):
-            long[axis] = _by_point(columns["surface_displacement_mm"][..., place], count)
+            long[axis] = by_point(columns["surface_displacement_mm"][..., place], count)
         for place, name in enumerate(COVARIANCE):
-            long[f"surface_cov_{name}_mm2"] = _by_point(columns["surface_cov_mm2"][..., place], count)
+            long[f"surface_cov_{name}_mm2"] = by_point(columns["surface_cov_mm2"][..., place], count)
+    if "force_n" in columns:
+        long |= force_long_form(columns, count)
     return long
-
-
-def _by_point(of_markers: np.ndarray, count: int) -> np.ndarray:
-    """(F * count,) from (F, M): NaN for the virtual markers."""
-    padded = np.full((len(of_markers), count), np.nan, of_markers.dtype)
-    padded[:, : of_markers.shape[1]] = of_markers
-    return padded.reshape(-1)

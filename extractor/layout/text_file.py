@@ -23,6 +23,23 @@ def read_text_file(path: str | PathLike[str], most_bytes: int, error: type[Extra
         ExtractorError: of the class ``error``: the file cannot be opened, is no regular file, is larger than the
             limit, or is not UTF-8.
     """
+    data = read_bytes_file(path, most_bytes, error)
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as problem:
+        name = printable_path(path)
+        raise error(f"{name}: byte {problem.start} is not UTF-8; expected a text file in UTF-8") from None
+
+
+def read_bytes_file(
+    path: str | PathLike[str], most_bytes: int, error: type[ExtractorError], expected: str = "a text file"
+) -> bytes:
+    """The bytes of a regular file; arguments and errors as of ``read_text_file``.
+
+    Args:
+        path, most_bytes, error: see ``read_text_file``.
+        expected: what a smaller file would be, for the message.
+    """
     name = printable_path(path)
     try:
         # Without O_NONBLOCK, opening a pipe waits until another process writes into it.
@@ -45,11 +62,8 @@ def read_text_file(path: str | PathLike[str], most_bytes: int, error: type[Extra
     if kind:
         raise error(f"{name}: cannot be read: it is {kind}; expected a regular file")
     if len(data) > most_bytes:
-        raise error(f"{name}: larger than {most_bytes >> 20} MiB; expected a text file")
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError as problem:
-        raise error(f"{name}: byte {problem.start} is not UTF-8; expected a text file in UTF-8") from None
+        raise error(f"{name}: larger than {most_bytes >> 20} MiB; expected {expected}")
+    return data
 
 
 def printable_path(path: str | PathLike[str]) -> str:

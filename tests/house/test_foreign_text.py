@@ -26,6 +26,7 @@ READS = {
     "extractor/layout/text_file.py": {"os.open", "os.fdopen"},
     "extractor/layout/json_fields.py": {"json.loads"},
     "extractor/space/rig.py": {"tomllib.loads"},
+    "extractor/contact/gel.py": {"np.load"},  # of bytes that text_file.py read
     "cmpdesign/files/images.py": {"cv2.imdecode"},  # of bytes that inputs/files.py read
     "cmpdesign/products/laser/coupon/stated_response.py": {
         "Image.open"

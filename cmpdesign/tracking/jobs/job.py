@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from cmpdesign.contact.elastomer import Elastomer
     from cmpdesign.tracking.run import TrackingRun
     from extractor import Reference
+    from extractor.contact import ContactReader
 
 Summary = TypeVar("Summary", bound=Document, covariant=True)
 
@@ -185,11 +186,16 @@ class ReconstructJob:
             model_px=how["model_px"],
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
+        gel = _path(how["contact"])
+        contact = None if gel is None else _contact_reader(gel, self.rig, views.layout)
         source = open_sources(self.source, how["fps"], how["max_pixels"], how["times"])
         is_one_a_view = len(split_list(self.source)) > 1
         recording = replace(recording_of(how), views=rig.views, is_image_one_a_view=is_one_a_view)
         outputs = open_outputs(
-            self.output, ShapeTable(reconstructor, continuation, lambda: source.times), recording, viewer
+            self.output,
+            ShapeTable(reconstructor, continuation, lambda: source.times, contact),
+            recording,
+            viewer,
         )
         tracker = ShapeTracker(
             reconstructor,
@@ -293,6 +299,14 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 
     edges_mm = np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0]
     return SurfaceContinuation(elastomer, layout.xy_mm, float(np.median(np.hypot(*edges_mm.T))))
+
+
+def _contact_reader(gel: Path, rig: Path, layout: Reference) -> ContactReader:
+    from cmpdesign.tracking.marker_depth import read_young_mpa
+    from extractor.contact import ContactReader, load_gel
+
+    young_mpa, sigma_mpa = read_young_mpa(rig)
+    return ContactReader(layout, load_gel(gel), young_mpa, young_sigma_mpa=sigma_mpa)
 
 
 def _path(given: str | Path | None) -> Path | None:

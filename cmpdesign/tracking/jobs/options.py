@@ -72,9 +72,12 @@ class ShapeOptions(SequenceOptions, total=False):
         flatness_mm: standard deviation of the markers from a plane at rest.
         model_px: error of the camera model, pixels; None: from the rest frame.
         surface: also write the touched surface, by the [elastomer] of the rig, in separate columns.
+        contact: also write force, torque and traction, by this file of calibrate gel and the modulus of the rig's
+            [elastomer].
     """
 
     from_rest: Annotated[bool, Usual(False)]
     flatness_mm: Annotated[float, Usual(0.0, metavar="MM", least=0)]
     model_px: Annotated[float | None, Usual(None, metavar="PX", least=0)]
     surface: Annotated[bool, Usual(False)]
+    contact: Annotated[str | Path | None, Usual(None, metavar="GEL")]

@@ -1,0 +1,206 @@
+"""Tractions under which the markers move as measured: pressure is never negative, shear acts only where it presses.
+
+Minimised is (d - A t)' W (d - A t) + |t|^2 / tau^2, with W the inverse covariance of the displacements d. The support,
+the set of loads that press, is an active set (Lawson and Hanson 1974): loads whose pressure would be negative leave
+it, loads at which the residual asks for pressure join it. The gain of a load is the decrease of the sum's root by this
+load alone. It is compared with chi, the root mean square of the whitened residual, so that the model's own error does
+not add stray loads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.contact.gel import Gel
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds of the active set.
+
+    Attributes:
+        tau: standard deviation of the peak tractions before the measurement, in Young's moduli. Chosen; not sensitive.
+        gain_beside, gain_elsewhere: gain in units of chi above which a load beside the support, or elsewhere, is added.
+            Chosen.
+        rounds: additions to the support at most. Chosen.
+        descents: steps of the projected gradient of a cold start. Chosen.
+        seed_share: share of the largest pressure above which a load of the cold start belongs to the support. Chosen.
+    """
+
+    tau: float = 0.5
+    gain_beside: float = 3.0
+    gain_elsewhere: float = 12.0
+    rounds: int = 12
+    descents: int = 80
+    seed_share: float = 0.08
+
+
+LIMITS = Limits()
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The tractions of the loads in the support.
+
+    Attributes:
+        support: (S,) ids of loads.
+        traction: (S, 3) peak tractions in Young's moduli.
+        inverse: (3 S, 3 S) their covariance by the noise, in squared Young's moduli.
+        chi: root mean square of the whitened residual; at least 1.
+        largest_gain: of all loads before any was in the support.
+    """
+
+    support: Ids
+    traction: Array
+    inverse: Array
+    chi: float
+    largest_gain: float
+
+
+class TractionSolver:
+    """Solves for tractions in Young's moduli. It keeps no state between frames."""
+
+    def __init__(self, gel: Gel, limits: Limits = LIMITS) -> None:
+        self._limits = limits
+        markers, loads = gel.matrix.shape[0] // 3, len(gel.loads_mm)
+        self._matrix = gel.matrix.reshape(markers, 3, loads, 3)
+        by_load = np.ascontiguousarray(self._matrix.transpose(2, 3, 0, 1)).reshape(loads, 3, 3 * markers)
+        self._by_load = by_load
+        # pressure is minus the traction in z
+        self._press = np.ascontiguousarray(-by_load[:, 2])
+        self._squares = (self._press.reshape(loads, markers, 3).astype(np.float64) ** 2).sum(axis=1)
+        self._neighbours = _neighbours(gel.loads_mm, gel.spacing_mm)
+        self._coarse = _thinned(gel.loads_mm, gel.spacing_mm)
+        coarse = self._press[self._coarse].astype(np.float64)
+        self._coarse_gram = coarse @ coarse.T
+        self._coarse_step = 1.0 / np.linalg.eigvalsh(self._coarse_gram)[-1]
+
+    def solve(self, displacement_mm: Array, whitening: Array, start: Ids | None) -> Solution | None:
+        """The tractions; None where nothing presses.
+
+        Args:
+            displacement_mm: (M, 3) of the markers; 0 where unknown.
+            whitening: (M, 3, 3) of which the transpose times itself is the inverse covariance; 0 where unknown.
+            start: (S,) support of the frame before; None: a cold start.
+        """
+        white = np.einsum("mij,mj->mi", whitening, displacement_mm)
+        known = max(3, int((np.abs(whitening).max(axis=(1, 2)) > 0).sum()) * 3)
+        weight = np.einsum("mij,mij->j", whitening, whitening) / (known / 3)
+        curvature = self._squares @ weight * (known / len(white) / 3) + self._limits.tau**-2
+        gain = self._gains(white, whitening, curvature)
+        largest = float(gain.max())
+        if largest < self._limits.gain_elsewhere:
+            return None
+        support = self._cold_start(displacement_mm) if start is None or not len(start) else start
+        for _ in range(self._limits.rounds):
+            support, traction, inverse, residual = self._settle(white, whitening, support)
+            chi = max(1.0, float(np.sqrt((residual**2).sum() / known)))
+            gain = self._gains(residual, whitening, curvature)
+            gain[support] = 0.0
+            beside = np.zeros(len(gain) + 1, np.bool_)
+            beside[self._neighbours[support].ravel()] = True
+            limit = np.where(beside[:-1], self._limits.gain_beside, self._limits.gain_elsewhere)
+            wanted = gain > chi * limit
+            stray = self._strays(support, traction, inverse, chi)
+            if not wanted.any() and not stray.any():
+                break
+            support = np.union1d(support[~stray], np.flatnonzero(wanted))
+        else:
+            support, traction, inverse, residual = self._settle(white, whitening, support)
+        return Solution(support, traction, inverse, chi, largest) if len(support) else None
+
+    def _strays(self, support: Ids, traction: Array, inverse: Array, chi: float) -> NDArray[np.bool_]:
+        """(S,) the loads of connected parts that explain less than a load elsewhere would have to.
+
+        The largest part stays.
+        """
+        parts = _connected(support, self._neighbours)
+        stray = np.zeros(len(support), np.bool_)
+        gains = []
+        for part in range(int(parts.max(initial=-1)) + 1):
+            rows = 3 * np.flatnonzero(parts == part) + 2
+            pressure = traction.reshape(-1)[rows]
+            gains.append(float(np.sqrt(pressure @ np.linalg.solve(inverse[np.ix_(rows, rows)], pressure))))
+        for part, gain in enumerate(gains):
+            if gain < max(gains) and gain < self._limits.gain_elsewhere * chi:
+                stray |= parts == part
+        return stray
+
+    def _gains(self, white: Array, whitening: Array, curvature: Array) -> Array:
+        """(K,) the decrease of the sum's root by one more load's pressure; 0 where a suction would decrease it."""
+        back = np.einsum("mij,mi->mj", whitening, white).reshape(-1).astype(np.float32)
+        return np.asarray(np.maximum(self._press @ back, 0.0) / np.sqrt(curvature))
+
+    def _cold_start(self, displacement_mm: Array) -> Ids:
+        """Loads that press after a projected gradient of pressure alone, one load a marker (Nesterov 1983)."""
+        right = self._press[self._coarse] @ displacement_mm.reshape(-1).astype(np.float32)
+        at = ahead = np.zeros(len(right))
+        for k in range(self._limits.descents):
+            after = np.maximum(ahead + self._coarse_step * (right - self._coarse_gram @ ahead), 0.0)
+            ahead = after + k / (k + 3) * (after - at)
+            at = after
+        seeds = self._coarse[at > self._limits.seed_share * at.max()]
+        around = np.union1d(seeds, self._neighbours[seeds].ravel())
+        return np.asarray(around[around < len(self._press)])
+
+    def _settle(self, white: Array, whitening: Array, support: Ids) -> tuple[Ids, Array, Array, Array]:
+        """The support without loads that would pull, their tractions, covariance, and the whitened residual."""
+        blocks = np.einsum(
+            "mij,smaj->mias",
+            whitening,
+            self._by_load[support].reshape(len(support), 3, -1, 3).transpose(0, 2, 1, 3),
+            optimize=True,
+        )
+        columns = blocks.reshape(white.size, 3, len(support)).transpose(0, 2, 1).reshape(white.size, -1)
+        gram = columns.T @ columns
+        gram[np.diag_indices_from(gram)] += self._limits.tau**-2
+        right = columns.T @ white.reshape(-1)
+        kept = np.arange(len(support))
+        while len(kept):
+            rows = (3 * kept[:, None] + np.arange(3)).ravel()
+            part = gram[np.ix_(rows, rows)]
+            traction = np.linalg.solve(part, right[rows]).reshape(-1, 3)
+            pulls = traction[:, 2] >= 0
+            if not pulls.any():
+                break
+            kept = kept[~pulls]
+        if not len(kept):
+            return support[:0], np.empty((0, 3)), np.empty((0, 0)), white
+        residual = white.reshape(-1) - columns[:, rows] @ traction.reshape(-1)
+        return support[kept], traction, np.linalg.inv(part), residual.reshape(white.shape)
+
+
+def _neighbours(loads_mm: Array, spacing_mm: float) -> Ids:
+    """(K, 8) ids of the loads around every load; K stands for none."""
+    cell = np.round((loads_mm - loads_mm.min(axis=0)) / spacing_mm).astype(np.intp) + 1
+    table = np.full(cell.max(axis=0) + 2, len(loads_mm), np.intp)
+    table[cell[:, 0], cell[:, 1]] = np.arange(len(loads_mm))
+    steps = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+    return np.stack([table[cell[:, 0] + i, cell[:, 1] + j] for i, j in steps], axis=1)
+
+
+def _thinned(loads_mm: Array, spacing_mm: float) -> Ids:
+    """Every second load in both directions: about one a marker."""
+    cell = np.round(loads_mm / spacing_mm).astype(np.intp)
+    return np.flatnonzero((cell % 2 == 0).all(axis=1))
+
+
+def _connected(support: Ids, neighbours: Ids) -> NDArray[np.intp]:
+    """(S,) number of the connected part of every load of the support."""
+    place = np.full(int(max(neighbours.max(), len(neighbours))) + 1, -1, np.intp)
+    place[support] = np.arange(len(support))
+    around = place[neighbours[support]]
+    label = np.arange(len(support))
+    while True:
+        beside = np.where(around >= 0, label[around], len(support)).min(axis=1) if len(support) else label
+        lower = np.minimum(label, beside)
+        lower = lower[lower]
+        if (lower == label).all():
+            return np.asarray(np.unique(label, return_inverse=True)[1])
+        label = lower

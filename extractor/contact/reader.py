@@ -1,0 +1,255 @@
+"""From the displacement of the markers to force, torque and regions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.contact.active_set import Solution, TractionSolver
+from extractor.contact.gel import Gel
+from extractor.contact.regions import Patch, find_patches
+from extractor.contact.result import ContactForce, ContactReason, Region
+from extractor.errors import GelError
+from extractor.layout.layout_file import LayoutLike, layout_of
+from extractor.space.reconstruction import Shape
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ForceModel:
+    """What the linear model of a gel is worth.
+
+    Attributes:
+        strain_factor: the normal force is the linear one times 1 + ``strain_factor`` F / (A E). Chosen: 0, the
+            linear model.
+        noise_factor: factor of the noise's deviation, because the support is estimated too. Chosen.
+        normal_error, shear_error, torque_error: the model's own deviation, of the normal force, of the normal force and
+            the shear, and of the torque. Chosen; large-strain finite elements with friction have not confirmed them.
+        centre_error_mm: the same of the centre of pressure. Chosen.
+        largest_load: F / (A E) above which the frame has a reason. Chosen.
+        fewest_known: share of the markers that must have a displacement. Chosen.
+        rim_spacings: distance of the pressure to the gel's rim, in spacings of loads, below which the frame has a
+            reason. Chosen.
+    """
+
+    strain_factor: float = 0.0
+    noise_factor: float = 3.0
+    normal_error: float = 0.06
+    shear_error: float = 0.05
+    torque_error: float = 0.08
+    centre_error_mm: float = 0.06
+    largest_load: float = 0.8
+    fewest_known: float = 0.5
+    rim_spacings: float = 2.0
+
+
+MODEL = ForceModel()
+SMOOTH_SPACINGS = 0.8  # width of the smoothed loads; chosen
+LEAST_SIGMAS = 3.0  # of the force, below which it is too little
+
+
+class ContactReader:
+    """Reads the contact from displacements, frame after frame. Can be pickled and copied.
+
+    A frame starts from the support of the frame before; ``reset`` forgets it.
+
+    Args:
+        layout: the pad.
+        gel: its Green's matrix, see ``load_gel``.
+        young_mpa: Young's modulus; forces are proportional to it.
+        young_sigma_mpa: deviation of the modulus; it is part of every covariance.
+        about_mm: the point of the torque, in the layout frame; z = 0 is the touched face at rest.
+        friction: coefficient of friction for the utilisation; None: not known.
+        model: what the linear model is worth.
+
+    Raises:
+        GelError: the gel is another pad's, or the modulus is missing or not positive.
+    """
+
+    def __init__(
+        self,
+        layout: LayoutLike,
+        gel: Gel,
+        young_mpa: float,
+        *,
+        young_sigma_mpa: float = 0.0,
+        about_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        friction: float | None = None,
+        model: ForceModel = MODEL,
+    ) -> None:
+        self.layout = layout_of(layout)
+        gel.require_layout(self.layout)
+        if young_mpa is None or not np.isfinite(young_mpa) or young_mpa <= 0:
+            raise GelError(
+                f"young_mpa is {young_mpa}; forces need Young's modulus above 0 MPa: cmpdesign calibrate force"
+            )
+        self.gel, self.young_mpa, self.friction, self.model = gel, float(young_mpa), friction, model
+        self.young_share = float(young_sigma_mpa) / self.young_mpa
+        self.about_mm = np.asarray(about_mm, np.float64)
+        self._solver = TractionSolver(gel)
+        offset = self.layout.xy_mm[:, None] - gel.loads_mm
+        self._at_markers = np.exp(-0.5 * (offset**2).sum(axis=2) / gel.width_mm**2)
+        offset = gel.loads_mm[:, None] - gel.loads_mm
+        self._at_loads = np.exp(-0.5 * (offset**2).sum(axis=2) / gel.width_mm**2)
+        # the tractions of neighbouring loads scatter; the field of regions is smoothed to one spacing
+        smooth = (SMOOTH_SPACINGS * gel.spacing_mm) ** 2
+        self._smooth = gel.width_mm**2 / smooth * np.exp(-0.5 * (offset**2).sum(axis=2) / smooth)
+        self._rim_mm = _distance_inside(gel.outline_mm, gel.loads_mm)
+        self._support: NDArray[np.intp] | None = None
+
+    def reset(self) -> None:
+        """Forget the frame before."""
+        self._support = None
+
+    def read_shape(self, shape: Shape) -> ContactForce:
+        """The contact of a reconstructed surface."""
+        return self.read(shape.displacement_mm, shape.displacement_cov_mm2)
+
+    def read(self, displacement_mm: Array, cov_mm2: Array) -> ContactForce:
+        """The contact from displacements (M, 3) mm with covariances (M, 3, 3) mm^2; NaN where unknown.
+
+        Raises:
+            ValueError: another shape, or displacements without covariances.
+        """
+        count = len(self.layout.xy_mm)
+        if np.shape(displacement_mm) != (count, 3) or np.shape(cov_mm2) != (count, 3, 3):
+            raise ValueError(
+                f"displacement_mm {np.shape(displacement_mm)} and cov_mm2 {np.shape(cov_mm2)}; expected "
+                f"({count}, 3) and ({count}, 3, 3): one displacement and its covariance for every marker"
+            )
+        known = np.asarray(
+            np.isfinite(displacement_mm).all(axis=1) & np.isfinite(cov_mm2).all(axis=(1, 2)), np.bool_
+        )
+        present = max(int(self.layout.present.sum()), 1)
+        if known.sum() < self.model.fewest_known * present:
+            self._support = None
+            return self._without(ContactReason.TOO_FEW_MARKERS, np.nan)
+        whitening = np.zeros((count, 3, 3))
+        try:
+            whitening[known] = np.linalg.inv(np.linalg.cholesky(np.asarray(cov_mm2)[known]))
+        except np.linalg.LinAlgError:
+            raise ValueError(
+                "cov_mm2 has a matrix that is not positive definite; give the noise's covariance"
+            ) from None
+        solution = self._solver.solve(
+            np.where(known[:, None], displacement_mm, 0.0), whitening, self._support
+        )
+        self._support = None if solution is None else solution.support
+        return (
+            self._without(ContactReason.NOTHING_TOUCHED, 0.0) if solution is None else self._answer(solution)
+        )
+
+    def _without(self, reason: ContactReason, value: float) -> ContactForce:
+        none = np.full((3, 3), np.nan)
+        return ContactForce(
+            reason, np.full(3, value), none, np.full(3, value), none, self.about_mm, (), self.gel.loads_mm,
+            np.full((len(self.gel.loads_mm), 3), value), np.full((len(self.layout.xy_mm), 3), value), np.nan, np.nan,
+        )  # fmt: skip
+
+    def _answer(self, solution: Solution) -> ContactForce:
+        support, gel = solution.support, self.gel
+        force = self.young_mpa * solution.traction * gel.area_mm2[support, None]
+        traction = np.zeros((len(gel.loads_mm), 3))
+        traction[support] = self.young_mpa * solution.traction
+        patches = find_patches(gel, self._smooth @ -traction[:, 2], support)
+        for patch in patches:
+            mine = patch.members
+            load = -force[mine, 2].sum() / (patch.area_mm2 * self.young_mpa)
+            factor = 1 + self.model.strain_factor * load
+            force[mine, 2] *= factor
+            traction[support[mine], 2] *= factor
+        noise = solution.inverse * (self.model.noise_factor * self.young_mpa) ** 2 * solution.chi**2
+        whole = self._summed(np.arange(len(support)), support, force, noise)
+        regions = tuple(self._region(patch, support, force, noise) for patch in patches)
+        shear = float(np.hypot(*whole.force[:2]))
+        return ContactForce(
+            reason=self._reason(whole, patches, support),
+            force_n=whole.force,
+            force_cov_n2=whole.force_cov,
+            torque_nmm=whole.torque,
+            torque_cov_nmm2=whole.torque_cov,
+            about_mm=self.about_mm,
+            regions=tuple(sorted(regions, key=lambda region: float(region.force_n[2]))),
+            loads_mm=gel.loads_mm,
+            traction_mpa=self._at_loads @ traction,
+            marker_traction_mpa=self._at_markers @ traction,
+            utilisation=np.nan if self.friction is None else shear / (self.friction * -float(whole.force[2])),
+            misfit=solution.chi,
+        )
+
+    def _summed(
+        self, members: NDArray[np.intp], support: NDArray[np.intp], force: Array, noise: Array
+    ) -> _Sum:
+        area = self.gel.area_mm2[support[members]]
+        arm = np.column_stack([self.gel.loads_mm[support[members]], np.zeros(len(members))]) - self.about_mm
+        part = force[members]
+        total, torque = part.sum(axis=0), np.cross(arm, part).sum(axis=0)
+        to_force = np.einsum("k,ij->ikj", area, np.eye(3)).reshape(3, -1)
+        cross = np.zeros((len(members), 3, 3))
+        cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 0] = -arm[:, 2], arm[:, 1], arm[:, 2]
+        cross[:, 1, 2], cross[:, 2, 0], cross[:, 2, 1] = -arm[:, 0], -arm[:, 1], arm[:, 0]
+        to_torque = (cross * area[:, None, None]).transpose(1, 0, 2).reshape(3, -1)
+        rows = (3 * members[:, None] + np.arange(3)).ravel()
+        cov = noise[np.ix_(rows, rows)]
+        model = self.model
+        own = np.diag([model.shear_error**2, model.shear_error**2, model.normal_error**2])
+        share = np.hypot(*total[:2]) ** 2 + 0.1 * total[2] ** 2
+        own = own * np.array([share, share, total[2] ** 2])
+        own = own + self.young_share**2 * np.outer(total, total)
+        spread = float(
+            np.sqrt(
+                (np.abs(part[:, 2]) @ (arm[:, :2] ** 2).sum(axis=1)) / max(np.abs(part[:, 2]).sum(), 1e-12)
+            )
+        )
+        size = (
+            model.torque_error**2 * (torque**2).max()
+            + (0.3 * model.shear_error * spread * np.linalg.norm(total)) ** 2
+        )
+        own_torque = np.eye(3) * size + self.young_share**2 * np.outer(torque, torque)
+        return _Sum(
+            total, to_force @ cov @ to_force.T + own, torque, to_torque @ cov @ to_torque.T + own_torque
+        )
+
+    def _region(self, patch: Patch, support: NDArray[np.intp], force: Array, noise: Array) -> Region:
+        whole = self._summed(patch.members, support, force, noise)
+        at = self.gel.loads_mm[support[patch.members]]
+        press = -force[patch.members, 2]
+        centre = press @ at / press.sum()
+        rows = 3 * patch.members + 2
+        by_load = (at - centre) * (self.gel.area_mm2[support[patch.members]] / press.sum())[:, None]
+        cov = by_load.T @ noise[np.ix_(rows, rows)] @ by_load + self.model.centre_error_mm**2 * np.eye(2)
+        return Region(
+            patch.area_mm2, patch.outline_mm, centre, cov, whole.force, whole.force_cov, whole.torque
+        )
+
+    def _reason(self, whole: _Sum, patches: list[Patch], support: NDArray[np.intp]) -> ContactReason:
+        if -whole.force[2] < LEAST_SIGMAS * np.sqrt(whole.force_cov[2, 2]):
+            return ContactReason.TOO_LITTLE_FORCE
+        if (self._rim_mm[support] < self.model.rim_spacings * self.gel.spacing_mm).any():
+            return ContactReason.AT_RIM
+        area = sum(patch.area_mm2 for patch in patches)
+        if -whole.force[2] / (area * self.young_mpa) > self.model.largest_load:
+            return ContactReason.BEYOND_STRAIN
+        return ContactReason.NONE
+
+
+@dataclass(frozen=True, eq=False)
+class _Sum:
+    """Force and torque of some loads, with covariances."""
+
+    force: Array
+    force_cov: Array
+    torque: Array
+    torque_cov: Array
+
+
+def _distance_inside(outline_mm: Array, points_mm: Array) -> Array:
+    """(N,) distance of points to the nearest side of an outline."""
+    start, end = outline_mm, np.roll(outline_mm, -1, axis=0)
+    side = end - start
+    along = np.einsum("nkd,kd->nk", points_mm[:, None] - start, side) / (side**2).sum(axis=1)
+    foot = start + np.clip(along, 0, 1)[..., None] * side
+    return np.asarray(np.linalg.norm(points_mm[:, None] - foot, axis=2).min(axis=1))

@@ -1,0 +1,100 @@
+"""The regions of a pressure field: parts of the touched face that are separated by places with little pressure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.contact.gel import Gel
+
+Array = NDArray[np.float64]
+FINE = 4  # cells of the picture of the pressure per spacing of the loads; chosen
+TOUCHED_SHARE = 0.25  # of a region's largest pressure, above which a place is touched; chosen
+SADDLE_SHARE = (
+    0.6  # of the smaller of two peaks, below which the pressure between them separates regions; chosen
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """One region.
+
+    Attributes:
+        members: places in the support of its loads.
+        area_mm2: touched area.
+        outline_mm: (P, 2) its outline.
+    """
+
+    members: NDArray[np.intp]
+    area_mm2: float
+    outline_mm: Array
+
+
+def find_patches(gel: Gel, pressure_mpa: Array, support: NDArray[np.intp]) -> list[Patch]:
+    """The regions of the pressure (K,) at the loads; every load of the support belongs to one."""
+    step = gel.spacing_mm
+    low = gel.loads_mm.min(axis=0)
+    cell = np.round((gel.loads_mm - low) / step).astype(np.intp) + 1
+    field = np.zeros(cell.max(axis=0)[::-1] + 2)
+    field[cell[:, 1], cell[:, 0]] = pressure_mpa
+    mine = field[cell[support, 1], cell[support, 0]]
+    labels = _labels(field)
+    at = labels[cell[support, 1], cell[support, 0]]
+    found = []
+    fine = cv2.resize(field, None, fx=FINE, fy=FINE, interpolation=cv2.INTER_CUBIC)
+    wide = cv2.resize(labels.astype(np.float64), None, fx=FINE, fy=FINE, interpolation=cv2.INTER_NEAREST)
+    for label in np.unique(at):
+        members = np.flatnonzero(at == label)
+        touched = ((fine > TOUCHED_SHARE * mine[members].max()) & (wide == label)).astype(np.uint8)
+        outlines, _ = cv2.findContours(touched, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        outline = max(outlines, key=cv2.contourArea)[:, 0].astype(np.float64)
+        outline = ((outline + 0.5) / FINE - 0.5 - 1.0) * step + low
+        found.append(
+            Patch(members, max(float(touched.sum()), 1.0) * (step / FINE) ** 2, _counter_clockwise(outline))
+        )
+    return found
+
+
+def _labels(field: Array) -> NDArray[np.intp]:
+    """(ny, nx) label of every cell: cells climb to their neighbourhood's peak; peaks with a high saddle join."""
+    ny, nx = field.shape
+    padded = np.pad(field, 1, constant_values=-np.inf)
+    around = np.stack(
+        [padded[1 + i : 1 + i + ny, 1 + j : 1 + j + nx] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    )
+    step = around.argmax(axis=0)
+    step[field >= around.max(axis=0)] = 4
+    rows, columns = np.indices(field.shape)
+    goal = (rows + step // 3 - 1) * nx + columns + step % 3 - 1
+    goal = goal.ravel()
+    for _ in range(int(np.ceil(np.log2(ny + nx))) + 1):
+        goal = goal[goal]
+    value = field.ravel()
+    parent = np.arange(len(value))
+
+    def root(k: int) -> int:
+        while parent[k] != k:
+            k = int(parent[k])
+        return k
+
+    for a, b in (
+        (np.s_[:, :-1], np.s_[:, 1:]),
+        (np.s_[:-1], np.s_[1:]),
+        (np.s_[:-1, :-1], np.s_[1:, 1:]),
+        (np.s_[1:, :-1], np.s_[:-1, 1:]),
+    ):
+        grid = goal.reshape(ny, nx)
+        one, two, saddle = grid[a].ravel(), grid[b].ravel(), np.minimum(field[a], field[b]).ravel()
+        apart = one != two
+        for left, right, height in zip(one[apart], two[apart], saddle[apart], strict=True):
+            if height > SADDLE_SHARE * min(value[left], value[right]) and height > 0:
+                parent[root(int(left))] = root(int(right))
+    return np.array([root(int(k)) for k in goal], np.intp).reshape(ny, nx)
+
+
+def _counter_clockwise(outline: Array) -> Array:
+    x, y = outline.T
+    return outline if (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() >= 0 else outline[::-1].copy()
