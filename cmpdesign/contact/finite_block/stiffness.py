@@ -13,10 +13,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from cmpdesign.contact.finite_block.splines import SUPPORT, SplineAxis, ThicknessBasis
+from cmpdesign.libraries import extra
+
+with extra("evaluate"):
+    import scipy.sparse as sp
 
 Array = NDArray[np.float64]
 ERSATZ = 1e-4

@@ -8,15 +8,18 @@ the splines are too coarse, but there both responses have the same error. The ex
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.fft import irfft2, next_fast_len, rfft2
-from scipy.sparse.linalg import splu
 
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.contact.finite_block.dissection import dissection_order
 from cmpdesign.contact.finite_block.splines import SUPPORT, ThicknessBasis, axis_over
 from cmpdesign.contact.finite_block.stiffness import block_stiffness, wave_stiffness
+from cmpdesign.libraries import extra
+
+with extra("evaluate"):
+    import scipy.sparse as sp
+    from scipy.fft import irfft2, next_fast_len, rfft2
+    from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
 # Poisson's ratio of both spline solutions at most: beyond it splines of this degree are too stiff.
