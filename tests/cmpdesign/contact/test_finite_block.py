@@ -67,6 +67,7 @@ def test_a_load_in_the_middle_and_one_near_the_wall(
         np.testing.assert_allclose(found[:, :, axis], wanted[:, :, axis], atol=0.07 * largest)
 
 
+@pytest.mark.slow
 def test_walls_matter_and_a_wide_margin_removes_them(pad: Reference, gel: Gel) -> None:
     wide = make_gel(pad, LAYER, margin_mm=6.0)
     at = [int(np.hypot(*(one.loads_mm - (4.0, 1.0)).T).argmin()) for one in (gel, wide)]
@@ -77,6 +78,7 @@ def test_walls_matter_and_a_wide_margin_removes_them(pad: Reference, gel: Gel) -
     assert wide.digest != gel.digest
 
 
+@pytest.mark.slow
 def test_the_forward_solver_and_the_reader_agree(pad: Reference) -> None:
     wide = make_gel(pad, LAYER, margin_mm=6.0)
     contact = solve(LAYER, Ball(5.0), Motion(0.2), friction=0.5, size_mm=(16, 16), grid=96)
