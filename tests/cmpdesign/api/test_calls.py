@@ -29,6 +29,8 @@ CALLS = {
     "check": "load",
     "evaluate": "run_experiment",
     "calibrate camera": "calibrate_camera",
+    "calibrate force": "calibrate_force",
+    "calibrate gel": "calibrate_gel",
     "calibrate pattern": "calibrate_pattern",
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",

@@ -35,6 +35,7 @@ MAY_WRITE = {
     "cmpdesign/tracking/sinks/csv_sink.py": "grows, under a lock, opened exclusively",
     "cmpdesign/tracking/sinks/unfinished.py": "names the tables that grow",
     "cmpdesign/tracking/sinks/assembly.py": "is given a staged path",
+    "extractor/contact/gel.py": "into a stream, which the command writes at once",
     "cmpdesign/tracking/export/video.py": "is given a staged path",
     "cmpdesign/tracking/recording/images.py": "beside the chunks of a run, which grow under a lock",
     "cmpdesign/products/mold/step/step.py": "a temporary folder for the kernel's own reader",

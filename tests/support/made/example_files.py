@@ -28,6 +28,8 @@ from tests.support.tracking.press import write_press
 from tests.support.tracking.scenes import LAYERS, moving
 
 FRAMES = 3
+ELASTOMER = "[elastomer]\nthickness_mm = 4\npoisson = 0.5\nmarker_depth_mm = 0.5\n"
+MASSES_G = (20.0, 50.0, 100.0)
 SHEET_PICTURES = 5
 
 
@@ -46,6 +48,8 @@ def prepare_files(folder: Path, command: str) -> Path:
             write_layout(nominal_layout(), folder / "layout.json")
             write_rest_images(folder / "rest")
             _write_sheet(folder / "sheet")
+            (folder / "sensor.toml").write_text(ELASTOMER, encoding="utf-8")
+            _write_weighed(folder)
         case "kerf":
             _write_coupon(folder)
             _write_grid(folder)
@@ -70,6 +74,24 @@ def _write_moving(folder: Path) -> None:
             cv2.imwrite(str(folder / place / f"{number}.png"), image)
     cv2.imwrite(str(folder / "sample.png"), images[0])
     _write_video(folder / "press.mp4", images)
+
+
+def _write_weighed(folder: Path) -> None:
+    """A run with the columns that ``reconstruct --contact`` adds, each of its frames under a known mass."""
+    (folder / "moving").mkdir()
+    _write_moving(folder / "moving")
+    words = ("track", folder / "moving" / "layout.json", folder / "moving" / "frames")
+    assert run(*words, "-o", folder / "moving" / "run.npz").exit_code == 0
+    with np.load(folder / "moving" / "run.npz") as table:
+        columns = dict(table)
+    force_n = np.zeros((FRAMES, 3))
+    force_n[:, 2] = -9.81e-3 * np.array(MASSES_G)
+    variance_n2 = np.full((FRAMES, 6), 1e-4)
+    reason = np.zeros(FRAMES, np.uint8)
+    contact = {"force_n": force_n, "force_cov_n2": variance_n2, "contact_reason": reason, "young_mpa": 0.3}
+    np.savez(folder / "run.npz", **columns, **contact)
+    rows = "".join(f"{frame},{mass:g}\n" for frame, mass in enumerate(MASSES_G))
+    (folder / "weights.csv").write_text("frame,mass_g\n" + rows, encoding="utf-8")
 
 
 def _write_video(path: Path, images: Sequence[NDArray[Any]]) -> None:
