@@ -1,6 +1,6 @@
 """Layouts edited in memory: the value is refused when it is made, or every picture is read without an error.
 
-Native loops follow the indices of a layout without checks. ``make test-sanitized`` runs 2,000 of these layouts.
+Native loops follow the indices of a layout without checks. The slow test reads 2,000 of these layouts.
 """
 
 from __future__ import annotations
