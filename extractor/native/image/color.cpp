@@ -1,13 +1,11 @@
 #include "image/color.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace cmp::image {
 
 namespace {
 
-constexpr int VALUES = 256;        // of 8 bits
 constexpr int FRACTION_BITS = 12;  // of the quotients below, as in OpenCV
 constexpr int HALF = 1 << (FRACTION_BITS - 1);
 constexpr auto FULL_SATURATION = static_cast<float>(255 << FRACTION_BITS);
@@ -74,111 +72,24 @@ struct Strip {
       hsv[3 * i + 2] = value[i];
     }
   }
-
-  // S V / 255, rounded, in 16 bits
-  void write_chroma(View<std::uint8_t, 1> chroma) const {
-    const auto count = chroma.size();
-    for (Index i = 0; i < count; ++i) {
-      const auto product = static_cast<std::uint16_t>(saturation[i] * value[i]);
-      chroma[i] = static_cast<std::uint8_t>((product + (product >> 8) + 128) >> 8);
-    }
-  }
 };
-
-// The difference of two angles, unwrapped to the nearer side.
-double unwrapped_deg(double difference) { return difference - 360.0 * std::floor(difference / 360.0 + 0.5); }
 
 }  // namespace
 
-HueImages hsv_and_chroma(View<const std::uint8_t, 3> image) {
-  if (!image.is_contiguous()) return hsv_and_chroma(Array<std::uint8_t, 3>(image));
-  const auto height = image.size(0), width = image.size(1), count = height * width;
-  Array<std::uint8_t, 3> hsv({height, width, 3});
-  Array<std::uint8_t, 2> hue({height, width}), chroma({height, width});
+Array<std::uint8_t, 3> to_hsv(View<const std::uint8_t, 3> image) {
+  if (!image.is_contiguous()) return to_hsv(Array<std::uint8_t, 3>(image));
+  Array<std::uint8_t, 3> hsv(image.shape());
   const auto bgr_values = image.flat();
-  const auto hsv_values = hsv.flat(), hues = hue.flat(), chromas = chroma.flat();
+  const auto hsv_values = hsv.flat();
   Strip strip{};
-  for (Index begin = 0; begin < count; begin += STRIP_PX) {
-    const Index end = std::min(begin + STRIP_PX, count);
-    strip.read(bgr_values.slice(3 * begin, 3 * end));
+  for (Index begin = 0; begin < bgr_values.size(); begin += 3 * STRIP_PX) {
+    const Index end = std::min<Index>(begin + 3 * STRIP_PX, bgr_values.size());
+    strip.read(bgr_values.slice(begin, end));
     strip.update_value();
     strip.update_hue_and_saturation();
-    strip.write_hsv(hsv_values.slice(3 * begin, 3 * end));
-    strip.write_chroma(chromas.slice(begin, end));
-    std::copy_n(strip.hue.begin(), end - begin, hues.begin() + begin);
+    strip.write_hsv(hsv_values.slice(begin, end));
   }
-  return {std::move(hsv), std::move(hue), std::move(chroma)};
-}
-
-Array<double, 1> hue_weights(View<const std::uint8_t, 2> hue, View<const std::uint8_t, 2> chroma,
-                             const HueLimits& limits) {
-  const Index min_chroma = limits.min_chroma;
-  std::array<std::int64_t, VALUES> weights{};
-  const auto height = hue.size(0), width = hue.size(1);
-  for (Index y = 0; y < height; ++y) {
-    const auto hues = hue[y], levels = chroma[y];
-    for (Index x = 0; x < width; ++x) {
-      const Index level = levels[x];
-      if (level >= min_chroma) weights[hues[x]] += level;
-    }
-  }
-  Array<double, 1> out({HUES});
-  const auto totals = out.view();
-  for (Index one = 0; one < HUES; ++one) totals[one] = static_cast<double>(weights[one]);
-  return out;
-}
-
-FoundHues find_hues(View<const double, 1> weight, View<const double, 1> nominal_deg,
-                    const HueLimits& limits) {
-  Array<double, 1> shift({INKS}, 0.0);
-  for (std::int64_t round = 0; round < limits.rounds; ++round) {
-    std::array<double, INKS> total{}, moment{};
-    for (Index hue = 0; hue < HUES; ++hue) {
-      if (weight[hue] == 0.0) continue;
-      double smallest = 360.0;
-      Index nearest = 0;
-      for (Index ink = 0; ink < INKS; ++ink) {
-        const double difference =
-            unwrapped_deg(static_cast<double>(hue) * HUE_STEP_DEG - nominal_deg[ink] - shift[ink]);
-        if (std::abs(difference) < std::abs(smallest)) {
-          smallest = difference;
-          nearest = ink;
-        }
-      }
-      if (std::abs(smallest) < limits.width_deg) {
-        total[nearest] += weight[hue];
-        moment[nearest] += weight[hue] * smallest;
-      }
-    }
-    for (Index ink = 0; ink < INKS; ++ink) {
-      if (total[ink] == 0.0) return {std::move(shift), false};
-      const double moved = shift[ink] + moment[ink] / total[ink];
-      shift[ink] = std::min(std::max(moved, -limits.reach_deg), limits.reach_deg);
-    }
-  }
-  for (Index ink = 0; ink < INKS; ++ink) {
-    const double hue_deg = std::fmod(nominal_deg[ink] + shift[ink], 360.0);
-    shift[ink] = hue_deg < 0.0 ? hue_deg + 360.0 : hue_deg;
-  }
-  return {std::move(shift), true};
-}
-
-Array<std::uint8_t, 1> ink_of_hue(View<const double, 1> hues_deg, const HueLimits& limits) {
-  std::array<double, HUES> smallest, nearest{};
-  smallest.fill(limits.ink_width_deg);
-  for (Index ink = 0; ink < INKS; ++ink) {
-    const double ink_deg = hues_deg[ink];
-    for (int hue = 0; hue < HUES; ++hue) {
-      const double difference = std::abs(unwrapped_deg(hue * HUE_STEP_DEG - ink_deg));
-      const bool is_nearer = difference < smallest[hue];
-      smallest[hue] = is_nearer ? difference : smallest[hue];
-      nearest[hue] = is_nearer ? static_cast<double>(ink + 1) : nearest[hue];
-    }
-  }
-  Array<std::uint8_t, 1> inks({HUES});
-  std::transform(nearest.begin(), nearest.end(), inks.begin(),
-                 [](double ink) { return static_cast<std::uint8_t>(ink); });
-  return inks;
+  return hsv;
 }
 
 }  // namespace cmp::image

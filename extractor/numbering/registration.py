@@ -1,0 +1,418 @@
+"""Stage 7: registers connected parts of cells with the layout.
+
+What is unknown of a part is a motion: one of three turns, and a shift. All motions are scored by all witnesses: cells
+outside the layout, the naming of the inks, and the white cell's place. The part's motion is accepted if its lead
+over the second best is large. All other parts, a single cell being the smallest, are then registered against
+the placed ones by a smooth local map and their inks. A cell without a certain place has no number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor._native import numbering as native
+from extractor.cells.cell_mesh import CellMesh
+from extractor.cells.cells import Cells
+from extractor.image.pyramid import PyramidLevel
+from extractor.layout.lattice_tables import Lattice, cells_at
+from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
+from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
+from extractor.result import Origin, Reason
+
+MIN_LAYOUT_SHARE = 0.06  # of the layout's cells, of a part that gives the origin; chosen
+MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; chosen
+MAX_PARTS = 4  # that are tried for the origin, the largest; chosen
+NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
+MIN_CLASS_FIT = 0.55  # of the classes to the colors; two inks that look alike have two thirds. Chosen
+MIN_SIDE_FIT = 0.8  # the same, of a pattern whose side is refused; chosen
+SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
+MAX_BRIGHT = 12  # bright places that are looked at; with more of them none is evidence. Chosen
+MAX_TIED = 24  # motions between which the other parts may decide; chosen, for time
+OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
+LEAD = 8.0  # log odds of the best motion over the second best; chosen
+JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
+ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
+
+
+class WitnessLimits(NamedTuple):
+    """Weights of the witnesses of a part's motion.
+
+    Attributes:
+        outside_weight: log odds against a motion for each cell outside the layout. Chosen.
+        max_outside_share: of a part's cells outside the layout. Chosen.
+        min_outside: cells outside the layout that any part may have. Chosen.
+        trimmed_share: of a part's cells at each end, without which it fits into the layout. Chosen.
+        max_motions: the best motions, that are looked at. Chosen.
+    """
+
+    outside_weight: float = 3.0
+    max_outside_share: float = 0.1
+    min_outside: int = 3
+    trimmed_share: float = 0.03
+    max_motions: int = 60
+
+
+class WhiteLimits(NamedTuple):
+    """The witness of the white cell.
+
+    Attributes:
+        bright: whiteness of a down-cell that is not black. Chosen.
+        dark: whiteness of a black cell; blurred and milky black stays below. Chosen.
+        white_is_bright: probability that the white cell is bright. Chosen.
+        white_is_dark: log odds against a dark place. Chosen.
+        is_triangle: more log odds for a bright place with the triangle of a down-cell. Chosen.
+        max_without_triangle: log odds of any other bright place; a drop and glare are bright, too. Chosen.
+        center_reach: in edges, from a down-cell's place to the center of this triangle. Chosen.
+        corner_reach: in edges, between its corners and those of a cell turned around. Chosen.
+    """
+
+    bright: float = 0.6
+    dark: float = 0.3
+    white_is_bright: float = 0.9
+    white_is_dark: float = -3.0
+    is_triangle: float = 3.0
+    max_without_triangle: float = 3.0
+    center_reach: float = 0.3
+    corner_reach: float = 0.4
+
+
+class MapPrior(NamedTuple):
+    """The prior of local maps. Lengths are in edges; a term of degree k has the unit edge per edge^k.
+
+    Attributes:
+        noise: standard deviation of a cell's center. Chosen.
+        quadratic: of the terms of degree 2. Chosen.
+        cubic: of the terms of degree 3. Chosen.
+    """
+
+    noise: float = 0.08
+    quadratic: float = 0.05
+    cubic: float = 0.01
+
+
+class AttachmentLimits(NamedTuple):
+    """Limits of parts that are registered against placed ones.
+
+    Attributes:
+        prior: of the map.
+        known_cells: placed cells through which a map goes. Chosen.
+        judged_cells: cells of a part by which its motion is judged, those nearest to placed ones. Chosen.
+        max_rounds: passes over all parts. Chosen.
+        stiffness: of the prior's terms, in the map that looks for places. Chosen.
+        reach: in edges, of the places that are tried for a cell, beyond the nearest. Chosen.
+        max_corner_misfit: in edges, between a cell's corners and those of the map; a triangle that points the other way
+            has 1.15. Chosen.
+        max_misfit: mean log likelihood of the judged cells of an accepted part. Chosen.
+        outside_odds: log likelihood of a cell that lies outside, on a taken place, or nowhere near. Chosen.
+        margin: lead of the best motion. Chosen.
+        margin_of_misfit: the same, in addition, relative to the misfit of the best motion. Chosen.
+    """
+
+    prior: MapPrior = MapPrior()
+    known_cells: int = 36
+    judged_cells: int = 16
+    max_rounds: int = 6
+    stiffness: float = 0.1
+    reach: float = 3.2
+    max_corner_misfit: float = 0.6
+    max_misfit: float = 8.0
+    outside_odds: float = -12.5
+    margin: float = 6.0
+    margin_of_misfit: float = 2.5
+
+
+WITNESSES = WitnessLimits()
+WHITE = WhiteLimits()
+ATTACHMENT = AttachmentLimits()
+
+
+class RegisteredLayout(NamedTuple):
+    """The layout as native loops take it.
+
+    Attributes:
+        axial: (U, 2) int32, of the colored cells.
+        cell_lookup: (S, S) int32, as ``Lattice.cell_lookup``.
+    """
+
+    axial: NDArray[np.int32]
+    cell_lookup: NDArray[np.int32]
+
+
+class Motions(NamedTuple):
+    """The best motions of a part, the best first.
+
+    Attributes:
+        motion: (K, 3) int32, turn, and shifts of q and r.
+        score: (K,) float64, log odds.
+        inside: (K,) int64, number of cells in the layout.
+        white: (K,) float64, the log odds of the white place alone.
+    """
+
+    motion: NDArray[np.int32]
+    score: NDArray[np.float64]
+    inside: NDArray[np.int64]
+    white: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Numbering:
+    """Stage 7.
+
+    Attributes:
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        mirrored: the pattern is seen from its back.
+        origin: the evidence for the origin.
+        lead: log odds of the motion of the first part over the second best.
+        fields: the colors around the first part.
+    """
+
+    cell: NDArray[np.int32]
+    mirrored: bool
+    origin: Origin
+    lead: float
+    fields: InkFields
+
+
+@dataclass(frozen=True, eq=False)
+class Refusal:
+    """Why no cell is numbered.
+
+    Attributes:
+        reason: the reason.
+        fields: the colors around the largest part, if there is one.
+    """
+
+    reason: Reason
+    fields: InkFields | None = None
+
+
+class _WalkedImage(NamedTuple):
+    """The cells of an image, their links, light, and places in the lattice."""
+
+    view: PyramidLevel
+    cells: Cells
+    mesh: CellMesh
+    light: NDArray[np.float64]
+    walk: Walk
+
+    def seen_from(self, mirrored: bool) -> WalkedCells:
+        return seen_from(self.cells, self.mesh, self.walk, mirrored)
+
+
+class _Placed(NamedTuple):
+    """A part with its motions."""
+
+    part: int
+    cells: WalkedCells
+    fields: InkFields
+    motions: Motions
+    mirrored: bool
+    other_whites: int  # white triangles at black cells of the layout by the best motion
+
+    @property
+    def lead(self) -> float:
+        scores = self.motions.score
+        lead = float(scores[0] - scores[1]) if len(scores) > 1 else np.inf
+        return lead - OTHER_WHITE * self.other_whites
+
+    @property
+    def is_certain(self) -> bool:
+        return len(self.motions.score) > 0 and self.lead >= LEAD
+
+
+class Registration:
+    """Registers the cells of images with one layout.
+
+    Args:
+        lattice: the layout.
+        palette: its inks.
+        mirrored: whether images show the back; None where both sides are read.
+    """
+
+    def __init__(self, lattice: Lattice, palette: Palette, mirrored: bool | None) -> None:
+        self._lattice = lattice
+        self._palette = palette
+        self._mirrored = mirrored
+        self._layout = RegisteredLayout(lattice.axial, lattice.cell_lookup)
+        self.min_cells = max(MIN_LAYOUT_SHARE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
+
+    def number(
+        self, view: PyramidLevel, cells: Cells, mesh: CellMesh, light: NDArray[np.float64], walk: Walk
+    ) -> Numbering | Refusal:
+        """The numbers of the cells, or the reason why there are none.
+
+        Args:
+            view: the image at the scale of recognition.
+            cells, mesh, light, walk: the cells of the image, their links, light, and places in the lattice.
+        """
+        sizes = walk.sizes
+        large = [int(p) for p in np.argsort(-sizes, kind="stable")[:MAX_PARTS] if sizes[p] >= self.min_cells]
+        if not large:
+            return Refusal(Reason.NO_PATTERN)
+        image = _WalkedImage(view, cells, mesh, light, walk)
+        found = [self._register(image, part) for part in large]
+        placed = [one for one in found if isinstance(one, _Placed)]
+        certain = next((one for one in placed if one.is_certain), None)
+        if certain is None and placed:
+            certain = self._with_all_parts(image, placed[0])
+        if certain is not None:
+            return self._number_with(image, certain, [part for part in large if part != certain.part])
+        return found[0] if isinstance(found[0], Refusal) else Refusal(_uncertain_reason(found[0]), found[0].fields)
+
+    def _register(self, image: _WalkedImage, part: int) -> _Placed | Refusal:
+        """A part with its motions, or the reason why its side is refused."""
+        mirrored = bool(self._mirrored)
+        walked = image.seen_from(mirrored)
+        fields = ink_fields(image.view, walked, image.light, part)
+        fit = class_fit(fields, walked, part)
+        if fit < MIN_CLASS_FIT:
+            return Refusal(Reason.NO_PATTERN, fields)
+        own, other = self._palette.naming(fields.shares), self._palette.naming(fields.shares, other_side=True)
+        lead = float(other.max() - own.max())
+        if self._mirrored is None and lead > 0.0:
+            mirrored = not mirrored
+            walked = image.seen_from(mirrored)
+            fields = ink_fields(image.view, walked, image.light, part)
+            own = self._palette.naming(fields.shares)
+        is_other = abs(lead) < SIDE_LEAD if self._mirrored is None else lead > SIDE_LEAD
+        if is_other and fit < MIN_SIDE_FIT:
+            return Refusal(Reason.NO_PATTERN, fields)
+        if is_other:
+            known = self._mirrored is not None
+            reason = self._palette.other_side_reason(fields.shares) if known else Reason.OTHER_SIDE
+            return Refusal(reason, fields)
+        naming = NAMING_WEIGHT * (own - own.max())
+        axial = np.ascontiguousarray(walked.axial[walked.part == part])
+        triangles = white_triangles(walked, part, fields)
+        white = white_odds(fields.whiteness, triangles)
+        found = native.register_part(axial, naming, fields.down_axial, white, self._layout, WITNESSES)
+        motions = Motions(*found)
+        return _Placed(
+            part, walked, fields, motions, mirrored, self._other_whites(fields.down_axial[triangles], motions)
+        )
+
+    def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
+        """The number of white triangles (W, 2) that the best motion carries to black cells of the layout."""
+        if len(motions.score) == 0:
+            return 0
+        turn, dq, dr = (int(v) for v in motions.motion[0])
+        count = 0
+        for q, r in white_axial.tolist():
+            for _ in range(turn):
+                q, r = -q - r, q - 1
+            q, r = q + dq, r + dr
+            beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
+            count += (q, r) != (0, 0) and bool((beside >= 0).all())
+        return count
+
+    def _with_all_parts(self, image: _WalkedImage, placed: _Placed) -> _Placed | None:
+        """The part with a certain motion, if the other parts decide between its best motions; None if they do not.
+
+        Under each motion the other parts are registered; a cell without a place counts as one outside the layout.
+        """
+        motions = placed.motions
+        tied = np.flatnonzero(motions.score > motions.score[:1].max(initial=-np.inf) - LEAD)
+        if not 0 < len(tied) <= MAX_TIED:
+            return None
+        counts = np.array([np.count_nonzero(self._placed_cells(placed, k) >= 0) for k in tied])
+        score = motions.score[tied] + WITNESSES.outside_weight * counts
+        order = np.argsort(-score, kind="stable")
+        chosen = Motions(*(values[tied[order]] for values in motions))._replace(score=score[order])
+        decided = placed._replace(motions=chosen)
+        return decided if decided.lead >= JOINT_LEAD else None
+
+    def _placed_cells(self, placed: _Placed, number: int) -> NDArray[np.int32]:
+        """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
+        own = placed.cells.part == placed.part
+        axial = np.ascontiguousarray(placed.cells.axial[own])
+        turn, dq, dr = (int(v) for v in placed.motions.motion[number])
+        cell = np.full(len(own), -1, np.int32)
+        cell[own] = native.moved_cells(axial, turn, dq, dr, self._layout.cell_lookup)
+        shift = _class_shift(self._lattice, cell[own], axial)
+        odds = np.ascontiguousarray(placed.fields.odds[:, (np.arange(3) - shift) % 3])
+        cell = native.attach_parts(placed.cells, cell, odds, self._lattice.layout_cells, *self._layout, ATTACHMENT)
+        odd = is_odd(odds, self._lattice.ink[np.maximum(cell, 0)].astype(np.intp) - 1)
+        return np.where(odd, -1, cell).astype(np.int32)
+
+    def _number_with(self, image: _WalkedImage, placed: _Placed, others: list[int]) -> Numbering | Refusal:
+        """The numbers of all cells, by the part whose motion is certain."""
+        cell = self._placed_cells(placed, 0)
+        for part in others:
+            if (cell[image.walk.part == part] >= 0).any():
+                continue
+            second = self._register(image, part)
+            if isinstance(second, _Placed) and second.is_certain and second.motions.white[0] > 0.0:
+                return Refusal(Reason.SEVERAL_PADS, placed.fields)
+        origin = Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
+        return Numbering(cell, placed.mirrored, origin, placed.lead, placed.fields)
+
+
+def class_fit(fields: InkFields, cells: WalkedCells, part: int) -> float:
+    """The share of a part's cells whose color is the likeliest for their own class; a third by chance."""
+    own = cells.part == part
+    classes = (cells.axial[own, 0] - cells.axial[own, 1]) % 3
+    return float((fields.odds[own][np.arange(len(classes)), classes] == 0.0).mean())
+
+
+def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """(N,) bool, the cells whose color is not that of their own class (N,), modulo 3, but that of another class.
+
+    Args:
+        odds: (N, 3), the log likelihoods of the classes.
+    """
+    return np.asarray(odds[np.arange(len(odds)), own % 3] < ODD_INK)
+
+
+def white_triangles(cells: WalkedCells, part: int, fields: InkFields) -> NDArray[np.bool_]:
+    """(D,) bool, the bright down-cells at which a region was found that is a triangle as a down-cell is there.
+
+    A drop, glare or a scratch hardly ever ends at the sides of a cell.
+    """
+    found = np.zeros(len(fields.whiteness), np.bool_)
+    vectors = cells.corner_px - cells.center_px[:, None]
+    members = np.flatnonzero(cells.part == part)
+    for n in np.flatnonzero(fields.whiteness > WHITE.bright)[:MAX_BRIGHT]:
+        place = fields.down_px[n]
+        distance = np.hypot(*(cells.center_px - place).T)
+        region, near = int(distance.argmin()), members[distance[members].argmin()]
+        edge = np.linalg.norm(vectors[near, 0] - vectors[near, 1])
+        if distance[region] > WHITE.center_reach * edge:
+            continue
+        misfits = [np.linalg.norm(vectors[region] + np.roll(vectors[near], k, axis=0), axis=1).max() for k in range(3)]
+        found[n] = min(misfits) < WHITE.corner_reach * edge
+    return found
+
+
+def white_odds(whiteness: NDArray[np.float64], is_triangle: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(D,) log odds that a down-cell of this whiteness (D,) is the white one over a black one; NaN is unknown.
+
+    How often a black cell is bright is seen in the image itself: glare, dirt and scratches are bright, too.
+    """
+    known = np.isfinite(whiteness)
+    bright = known & (whiteness > WHITE.bright)
+    others = max(int(bright.sum()) - 1, 0)
+    is_bright = np.log(WHITE.white_is_bright * (known.sum() + 1.0) / (others + 0.5))
+    dark = known & (whiteness < WHITE.dark)
+    is_bright = np.where(is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
+    return np.where(known, np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0)), np.nan)
+
+
+def _uncertain_reason(placed: _Placed) -> Reason:
+    """Why a part has no certain motion."""
+    white = placed.motions.white
+    close = placed.motions.score > placed.motions.score[0] - LEAD if len(white) else np.zeros(0, bool)
+    whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites
+    if whites > 1:
+        return Reason.SEVERAL_PADS
+    return Reason.AMBIGUOUS if np.count_nonzero(white[close] > 0.0) > 1 else Reason.REFERENCE_LOST
+
+
+def _class_shift(lattice: Lattice, cell: NDArray[np.int32], axial: NDArray[np.int32]) -> int:
+    """By which a motion shifts the classes (q - r) mod 3."""
+    first = int(np.argmax(cell >= 0))
+    q, r = lattice.axial[cell[first]]
+    return int((q - r - axial[first, 0] + axial[first, 1]) % 3)
