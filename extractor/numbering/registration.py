@@ -103,13 +103,15 @@ class AttachmentLimits(NamedTuple):
         judged_cells: cells of a part by which its motion is judged, those nearest to placed ones. Chosen.
         max_rounds: passes over all parts. Chosen.
         stiffness: of the prior's terms, in the map that looks for places. Chosen.
-        reach: in edges, of the places that are tried for a cell, beyond the nearest. Chosen.
+        reach: in edges, beyond the nearest place, the farthest of the places that are tried for a cell. Chosen.
+        reach_deviations: of the map, of these places beyond the neighbours. Chosen.
         max_corner_misfit: in edges, between a cell's corners and those of the map; a triangle that points the other way
             has 1.15. Chosen.
         max_misfit: mean log likelihood of the judged cells of an accepted part. Chosen.
         outside_odds: log likelihood of a cell that lies outside, on a taken place, or nowhere near. Chosen.
         margin: lead of the best motion. Chosen.
         margin_of_misfit: the same, in addition, relative to the misfit of the best motion. Chosen.
+        with_single_cells: cells without a part are registered, too.
     """
 
     prior: MapPrior = MapPrior()
@@ -118,11 +120,13 @@ class AttachmentLimits(NamedTuple):
     max_rounds: int = 6
     stiffness: float = 0.1
     reach: float = 3.2
+    reach_deviations: float = 4.0
     max_corner_misfit: float = 0.6
     max_misfit: float = 8.0
     outside_odds: float = -12.5
     margin: float = 6.0
     margin_of_misfit: float = 2.5
+    with_single_cells: bool = True
 
 
 WITNESSES = WitnessLimits()
@@ -203,14 +207,21 @@ class _WalkedImage(NamedTuple):
         return seen_from(self.cells, self.mesh, self.walk, mirrored)
 
 
-class _Placed(NamedTuple):
-    """A part with its motions."""
+class _Seen(NamedTuple):
+    """A part with its colors."""
 
     part: int
     cells: WalkedCells
     fields: InkFields
-    motions: Motions
     mirrored: bool
+    naming: NDArray[np.float64]  # (3,) log odds of the namings
+
+
+class _Placed(NamedTuple):
+    """A part with its motions."""
+
+    seen: _Seen
+    motions: Motions
     other_whites: int  # white triangles at black cells of the layout by the best motion
 
     @property
@@ -254,17 +265,19 @@ class Registration:
         if not large:
             return Refusal(Reason.NO_PATTERN)
         image = _WalkedImage(view, cells, mesh, light, walk)
-        found = [self._register(image, part) for part in large]
+        seen = [self._see(image, part) for part in large]
+        bright = BrightPlaces.of([one.fields.whiteness for one in seen if isinstance(one, _Seen)])
+        found = [self._register(one, bright) if isinstance(one, _Seen) else one for one in seen]
         placed = [one for one in found if isinstance(one, _Placed)]
         certain = next((one for one in placed if one.is_certain), None)
         if certain is None and placed:
             certain = self._with_all_parts(image, placed[0])
         if certain is not None:
-            return self._number_with(image, certain, [part for part in large if part != certain.part])
-        return found[0] if isinstance(found[0], Refusal) else Refusal(_uncertain_reason(found[0]), found[0].fields)
+            return self._number_with(certain, [one for one in placed if one.seen.part != certain.seen.part])
+        return found[0] if isinstance(found[0], Refusal) else Refusal(_uncertain_reason(found[0]), found[0].seen.fields)
 
-    def _register(self, image: _WalkedImage, part: int) -> _Placed | Refusal:
-        """A part with its motions, or the reason why its side is refused."""
+    def _see(self, image: _WalkedImage, part: int) -> _Seen | Refusal:
+        """The colors of a part, or the reason why its side is refused."""
         mirrored = bool(self._mirrored)
         walked = image.seen_from(mirrored)
         fields = ink_fields(image.view, walked, image.light, part)
@@ -285,15 +298,17 @@ class Registration:
             known = self._mirrored is not None
             reason = self._palette.other_side_reason(fields.shares) if known else Reason.OTHER_SIDE
             return Refusal(reason, fields)
-        naming = NAMING_WEIGHT * (own - own.max())
-        axial = np.ascontiguousarray(walked.axial[walked.part == part])
-        triangles = white_triangles(walked, part, fields)
-        white = white_odds(fields.whiteness, triangles)
-        found = native.register_part(axial, naming, fields.down_axial, white, self._layout, WITNESSES)
+        return _Seen(part, walked, fields, mirrored, NAMING_WEIGHT * (own - own.max()))
+
+    def _register(self, seen: _Seen, bright: BrightPlaces) -> _Placed:
+        """A part with its motions."""
+        fields = seen.fields
+        axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
+        triangles = white_triangles(seen.cells, seen.part, fields)
+        white = bright.white_odds(fields.whiteness, triangles)
+        found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, WITNESSES)
         motions = Motions(*found)
-        return _Placed(
-            part, walked, fields, motions, mirrored, self._other_whites(fields.down_axial[triangles], motions)
-        )
+        return _Placed(seen, motions, self._other_whites(fields.down_axial[triangles], motions))
 
     def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
         """The number of white triangles (W, 2) that the best motion carries to black cells of the layout."""
@@ -318,37 +333,38 @@ class Registration:
         tied = np.flatnonzero(motions.score > motions.score[:1].max(initial=-np.inf) - LEAD)
         if not 0 < len(tied) <= MAX_TIED:
             return None
-        counts = np.array([np.count_nonzero(self._placed_cells(placed, k) >= 0) for k in tied])
+        parts = ATTACHMENT._replace(with_single_cells=False)
+        counts = np.array([np.count_nonzero(self._placed_cells(placed, k, parts) >= 0) for k in tied])
         score = motions.score[tied] + WITNESSES.outside_weight * counts
         order = np.argsort(-score, kind="stable")
         chosen = Motions(*(values[tied[order]] for values in motions))._replace(score=score[order])
         decided = placed._replace(motions=chosen)
         return decided if decided.lead >= JOINT_LEAD else None
 
-    def _placed_cells(self, placed: _Placed, number: int) -> NDArray[np.int32]:
+    def _placed_cells(self, placed: _Placed, number: int, limits: AttachmentLimits = ATTACHMENT) -> NDArray[np.int32]:
         """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
-        own = placed.cells.part == placed.part
-        axial = np.ascontiguousarray(placed.cells.axial[own])
+        seen = placed.seen
+        own = seen.cells.part == seen.part
+        axial = np.ascontiguousarray(seen.cells.axial[own])
         turn, dq, dr = (int(v) for v in placed.motions.motion[number])
         cell = np.full(len(own), -1, np.int32)
         cell[own] = native.moved_cells(axial, turn, dq, dr, self._layout.cell_lookup)
         shift = _class_shift(self._lattice, cell[own], axial)
-        odds = np.ascontiguousarray(placed.fields.odds[:, (np.arange(3) - shift) % 3])
-        cell = native.attach_parts(placed.cells, cell, odds, self._lattice.layout_cells, *self._layout, ATTACHMENT)
+        odds = np.ascontiguousarray(seen.fields.odds[:, (np.arange(3) - shift) % 3])
+        cell = native.attach_parts(seen.cells, cell, odds, self._lattice.layout_cells, *self._layout, limits)
         odd = is_odd(odds, self._lattice.ink[np.maximum(cell, 0)].astype(np.intp) - 1)
         return np.where(odd, -1, cell).astype(np.int32)
 
-    def _number_with(self, image: _WalkedImage, placed: _Placed, others: list[int]) -> Numbering | Refusal:
-        """The numbers of all cells, by the part whose motion is certain."""
+    def _number_with(self, placed: _Placed, others: list[_Placed]) -> Numbering | Refusal:
+        """The numbers of all cells, by the part whose motion is certain; other parts may show another pad."""
         cell = self._placed_cells(placed, 0)
-        for part in others:
-            if (cell[image.walk.part == part] >= 0).any():
+        for other in others:
+            if (cell[other.seen.cells.part == other.seen.part] >= 0).any():
                 continue
-            second = self._register(image, part)
-            if isinstance(second, _Placed) and second.is_certain and second.motions.white[0] > 0.0:
-                return Refusal(Reason.SEVERAL_PADS, placed.fields)
+            if other.is_certain and other.motions.white[0] > 0.0:
+                return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
         origin = Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
-        return Numbering(cell, placed.mirrored, origin, placed.lead, placed.fields)
+        return Numbering(cell, placed.seen.mirrored, origin, placed.lead, placed.seen.fields)
 
 
 def class_fit(fields: InkFields, cells: WalkedCells, part: int) -> float:
@@ -387,18 +403,32 @@ def white_triangles(cells: WalkedCells, part: int, fields: InkFields) -> NDArray
     return found
 
 
-def white_odds(whiteness: NDArray[np.float64], is_triangle: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(D,) log odds that a down-cell of this whiteness (D,) is the white one over a black one; NaN is unknown.
+class BrightPlaces(NamedTuple):
+    """How often a down-cell of an image is bright: the white cell, and black cells under glare, dirt and scratches.
 
-    How often a black cell is bright is seen in the image itself: glare, dirt and scratches are bright, too.
+    Attributes:
+        known: number of down-cells of which the light is known.
+        bright: number of the bright ones among them.
     """
-    known = np.isfinite(whiteness)
-    bright = known & (whiteness > WHITE.bright)
-    others = max(int(bright.sum()) - 1, 0)
-    is_bright = np.log(WHITE.white_is_bright * (known.sum() + 1.0) / (others + 0.5))
-    dark = known & (whiteness < WHITE.dark)
-    is_bright = np.where(is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
-    return np.where(known, np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0)), np.nan)
+
+    known: int
+    bright: int
+
+    @staticmethod
+    def of(parts: list[NDArray[np.float64]]) -> BrightPlaces:
+        """Of the whiteness (D,) of the down-cells of each part."""
+        return BrightPlaces(
+            sum(int(np.isfinite(one).sum()) for one in parts), sum(int((one > WHITE.bright).sum()) for one in parts)
+        )
+
+    def white_odds(self, whiteness: NDArray[np.float64], is_triangle: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(D,) log odds that a down-cell of this whiteness (D,) is the white one over a black one; NaN is unknown."""
+        others = max(self.bright - 1, 0)
+        is_bright = np.log(WHITE.white_is_bright * (self.known + 1.0) / (others + 0.5))
+        bright, dark = whiteness > WHITE.bright, whiteness < WHITE.dark
+        is_bright = np.where(is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
+        odds = np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0))
+        return np.where(np.isfinite(whiteness), odds, np.nan)
 
 
 def _uncertain_reason(placed: _Placed) -> Reason:

@@ -7,6 +7,7 @@
 #include "cells/cell_mesh.hpp"
 #include "layout/lattice_tables.hpp"
 #include "numbering/lattice_motion.hpp"
+#include "numbering/link_bridges.hpp"
 
 namespace cmp::numbering {
 
@@ -75,6 +76,8 @@ class Walk {
     }
     return count;
   }
+  // Parts are what hangs together by loops of links: a single link may be false, and joins nothing.
+  void part_at_bridges() { part_ = parts_without_bridges(links_, part_); }
   Walked result(std::int64_t contradictions) && {
     return {std::move(axial_), std::move(first_), std::move(part_), contradictions};
   }
@@ -130,7 +133,10 @@ Walked walk_cells(const CellLinks& links, const WalkLimits& limits) {
     Array<bool, 1> bad(blocked.view());
     const std::int64_t here = walk.update_contradicted(bad);
     contradictions += here;
-    if (here == 0 || round >= limits.max_rounds) return std::move(walk).result(contradictions);
+    if (here == 0 || round >= limits.max_rounds) {
+      walk.part_at_bridges();
+      return std::move(walk).result(contradictions);
+    }
     blocked = std::move(bad);
   }
 }

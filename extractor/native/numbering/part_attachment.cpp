@@ -88,13 +88,14 @@ class Attachment {
     for (Index i = 0; i < cell.size(); ++i) {
       if (cell[i] >= 0) continue;
       if (cells.part[i] < 0) {
-        parts_.push_back({i});
+        if (limits.with_single_cells) parts_.push_back({i});
         continue;
       }
       const auto [found, is_new] = number.try_emplace(cells.part[i], parts_.size());
       if (is_new) parts_.emplace_back();
       parts_[found->second].push_back(i);
     }
+    tried_at_.resize(parts_.size());
   }
 
   // Places parts, the nearest first, until none can be placed.
@@ -107,11 +108,15 @@ class Attachment {
         if (!parts_[p].empty()) order.push_back({sort_by_distance(parts_[p], placed), p});
       std::sort(order.begin(), order.end());
       bool is_changed = false;
-      for (const auto& [distance, p] : order)
+      for (const auto& [distance, p] : order) {
+        // only a part beside newly placed cells is tried again
+        if (round > 0 && distance == tried_at_[p]) continue;
+        tried_at_[p] = distance;
         if (place(parts_[p], placed)) {
           parts_[p].clear();
           is_changed = true;
         }
+      }
       if (!is_changed) return;
     }
   }
@@ -139,8 +144,11 @@ class Attachment {
     judged.resize(std::min(judged.size(), static_cast<std::size_t>(limits_.judged_cells)));
     const auto support = support_of(judged[0], placed);
     if (!support) return false;
+    const auto places = places_near(judged[0], *support);
+    // a region in a cell that is placed, or in none, is no cell
+    if (part.size() == 1 && is_taken_[places[0]]) return false;
     ScoredMotion best{{}, -1e9}, second = best;
-    for (const std::int32_t u : places_near(judged[0], *support))
+    for (const std::int32_t u : places)
       for (std::int32_t turn = 0; turn < (part.size() == 1 ? 1 : TURNS); ++turn) {
         const Motion motion = motion_to(judged[0], u, turn);
         const double score = score_of(part, judged, *support, motion);
@@ -187,27 +195,34 @@ class Attachment {
     const double vx = corner(2, 0) - corner(0, 0), vy = corner(2, 1) - corner(0, 1);
     return std::max(std::sqrt(std::abs(ux * vy - uy * vx) * 2.0 / std::sqrt(3.0)), 1e-3);
   }
-  // The layout's cells that may be cell i: those near to its place by the stiff map.
+  // The layout's cells that may be cell i: those near to its place by the stiff map, the nearest first.
   std::vector<std::int32_t> places_near(Index i, const Support& support) {
     ++search_;
-    std::vector<std::int32_t> near{support.near};
-    seen_[near[0]] = search_;
-    double least = distance_to(support, near[0], i);
-    std::vector<std::int32_t> out;
+    std::vector<std::pair<double, std::int32_t>> near;
+    const auto add = [&](std::int32_t u) {
+      if (u < 0 || seen_[u] == search_) return;
+      seen_[u] = search_;
+      near.push_back({distance_to(support, u, i), u});
+    };
+    add(support.near);
+    double least = near[0].first, reach = reach_at(support, support.near);
     // from cell to cell of the layout, towards the place and around it
     for (std::size_t n = 0; n < near.size(); ++n) {
-      const double here = distance_to(support, near[n], i);
-      least = std::min(least, here);
-      if (here > least + limits_.reach) continue;
-      out.push_back(near[n]);
-      for (Index k = 0; k < layout_.cell_neighbours.size(1); ++k) {
-        const std::int32_t next = layout_.cell_neighbours(near[n], k);
-        if (next < 0 || seen_[next] == search_) continue;
-        seen_[next] = search_;
-        near.push_back(next);
-      }
+      const auto [here, u] = near[n];
+      if (here < least) least = here, reach = reach_at(support, u);
+      if (here > least + reach) continue;
+      for (Index k = 0; k < layout_.cell_neighbours.size(1); ++k) add(layout_.cell_neighbours(u, k));
     }
+    std::sort(near.begin(), near.end());
+    std::vector<std::int32_t> out;
+    for (const auto& [here, u] : near)
+      if (here <= least + reach) out.push_back(u);
     return out;
+  }
+  // In edges, how far around a place of the map others are tried.
+  double reach_at(const Support& support, std::int32_t u) const {
+    const MappedPoint point = support.map.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
+    return std::min(limits_.reach, 1.0 + limits_.reach_deviations * std::sqrt(point.variance) / support.edge_px);
   }
   // From the place of a layout's cell by the stiff map to a cell of the image, in edges.
   double distance_to(const Support& support, std::int32_t u, Index i) const {
@@ -272,6 +287,7 @@ class Attachment {
   Array<std::int32_t, 1> seen_;  // the search in which a cell of the layout was last seen
   std::int32_t search_ = 0;
   std::vector<std::vector<Index>> parts_;
+  std::vector<double> tried_at_;  // the squared distance of each part from placed cells when it was last tried
 };
 
 }  // namespace

@@ -12,13 +12,14 @@ namespace cmp::numbering {
 struct AttachmentLimits {
   localmap::MapPrior prior;
   std::int64_t known_cells, judged_cells, max_rounds;
-  double stiffness, reach, max_corner_misfit, max_misfit, outside_odds, margin, margin_of_misfit;
+  double stiffness, reach, reach_deviations, max_corner_misfit, max_misfit, outside_odds, margin, margin_of_misfit;
+  bool with_single_cells;
 
   template <class F>
   static AttachmentLimits read(const F& f) {
     return {f["prior"], f["known_cells"],       f["judged_cells"], f["max_rounds"], f["stiffness"],
-            f["reach"], f["max_corner_misfit"], f["max_misfit"],   f["outside_odds"], f["margin"],
-            f["margin_of_misfit"]};
+            f["reach"], f["reach_deviations"], f["max_corner_misfit"], f["max_misfit"],   f["outside_odds"], f["margin"],
+            f["margin_of_misfit"], f["with_single_cells"]};
   }
 };
 
