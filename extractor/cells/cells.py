@@ -28,15 +28,12 @@ class ShapeLimits(NamedTuple):
     """Limits of the shapes of triangles.
 
     Attributes:
-        min_triangularity: |E[z^3]| relative to a triangle's; a disc, an ellipse and a square have 0. Chosen between
-            both.
         max_elongation: (trace of the covariance)^2 / determinant; 4 is equilateral. Chosen.
         min_solidity, max_solidity: area over the root of the determinant of the covariance, relative to a triangle's;
             an ellipse has 1.21, ragged regions have less. Chosen.
         ragged_weight: of the difference between solidity and 1 in the quality of a shape. Chosen.
     """
 
-    min_triangularity: float = 0.5
     max_elongation: float = 16.0
     min_solidity: float = 0.7
     max_solidity: float = 1.25

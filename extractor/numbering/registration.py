@@ -231,6 +231,11 @@ class _Placed(NamedTuple):
         return lead - OTHER_WHITE * self.other_whites
 
     @property
+    def tied(self) -> NDArray[np.intp]:
+        """(T,) the motions that are not certainly worse than the best."""
+        return np.flatnonzero(self.motions.score > self.motions.score.max(initial=-np.inf) - LEAD)
+
+    @property
     def is_certain(self) -> bool:
         return len(self.motions.score) > 0 and self.lead >= LEAD
 
@@ -271,7 +276,7 @@ class Registration:
         placed = [one for one in found if isinstance(one, _Placed)]
         certain = next((one for one in placed if one.is_certain), None)
         if certain is None and placed:
-            certain = self._with_all_parts(image, placed[0])
+            certain = self._with_all_parts(min(placed, key=lambda one: len(one.tied) or MAX_TIED))
         if certain is not None:
             return self._number_with(certain, [one for one in placed if one.seen.part != certain.seen.part])
         return found[0] if isinstance(found[0], Refusal) else Refusal(_uncertain_reason(found[0]), found[0].seen.fields)
@@ -324,13 +329,13 @@ class Registration:
             count += (q, r) != (0, 0) and bool((beside >= 0).all())
         return count
 
-    def _with_all_parts(self, image: _WalkedImage, placed: _Placed) -> _Placed | None:
+    def _with_all_parts(self, placed: _Placed) -> _Placed | None:
         """The part with a certain motion, if the other parts decide between its best motions; None if they do not.
 
         Under each motion the other parts are registered; a cell without a place counts as one outside the layout.
         """
         motions = placed.motions
-        tied = np.flatnonzero(motions.score > motions.score[:1].max(initial=-np.inf) - LEAD)
+        tied = placed.tied
         if not 0 < len(tied) <= MAX_TIED:
             return None
         parts = ATTACHMENT._replace(with_single_cells=False)
@@ -434,7 +439,7 @@ class BrightPlaces(NamedTuple):
 def _uncertain_reason(placed: _Placed) -> Reason:
     """Why a part has no certain motion."""
     white = placed.motions.white
-    close = placed.motions.score > placed.motions.score[0] - LEAD if len(white) else np.zeros(0, bool)
+    close = placed.tied
     whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites
     if whites > 1:
         return Reason.SEVERAL_PADS

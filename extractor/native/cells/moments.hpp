@@ -86,12 +86,12 @@ inline void fill_corners(const MomentShape& shape, View<double, 2> corners) {
 
 // The limits of a triangle's shape; extractor/cells/cells.py explains them.
 struct ShapeLimits {
-  double min_triangularity, max_elongation, min_solidity, max_solidity, ragged_weight;
+  double max_elongation, min_solidity, max_solidity, ragged_weight;
 
-  // How much a region is a triangle: 1 at best; negative for other shapes.
+  // How much a region is a triangle: 1 at best, a little for a blurred one; negative for other shapes.
   double quality(const MomentShape& shape) const {
-    const bool is_triangle = shape.triangularity >= min_triangularity && shape.elongation <= max_elongation &&
-                             shape.solidity >= min_solidity && shape.solidity <= max_solidity;
+    const bool is_triangle = shape.elongation <= max_elongation && shape.solidity >= min_solidity &&
+                             shape.solidity <= max_solidity;
     return is_triangle
                ? std::min(shape.triangularity, 1.0) - ragged_weight * std::abs(shape.solidity - 1.0)
                : -1.0;
@@ -99,8 +99,7 @@ struct ShapeLimits {
 
   template <class F>
   static ShapeLimits read(const F& f) {
-    return {f["min_triangularity"], f["max_elongation"], f["min_solidity"],
-            f["max_solidity"],      f["ragged_weight"]};
+    return {f["max_elongation"], f["min_solidity"], f["max_solidity"], f["ragged_weight"]};
   }
 };
 
