@@ -1,6 +1,7 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
-Stages: image, seeds, mesh, walk, number, triangles, place, refine, repair, virtual, quality. A warm start of the tracker goes from image over predict and prove to refine.
+Stages: image, seeds, grow, mesh, light, walk, number, triangles, place, refine, repair, virtual, quality. A warm start of
+the tracker goes from image over predict and prove to refine.
 """
 
 from __future__ import annotations
@@ -307,6 +308,8 @@ class Extractor:
         self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages
     ) -> FoundCells:
         cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort, before))
+        if effort is not EFFORTS[0]:
+            cells = stages.record("grow", regions_as_cells(cells, grow(view, cells), view))
         mesh = stages.record("mesh", build_cell_mesh(cells))
         light = stages.record("light", cell_light(view, cells, mesh))
         walk = stages.record("walk", walk_cells(mesh, light))
