@@ -282,26 +282,28 @@ class Extractor:
         return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
-        """Stages 2 to 7 at the coarsest scale, and with the least effort, that numbers the cells; else the reason where
-        most cells were found."""
+        """Stages 2 to 7 at the coarsest scale that numbers cells, with as much effort as finds them all; else the reason
+        where most cells were found."""
         smallest = pyramid.level(_recognition_scales(pyramid.size)[0]).image
         failed = Unnumbered(Refusal(Reason.NO_PATTERN if has_color(smallest) else Reason.NO_COLOR))
         for scale in _recognition_scales(pyramid.size):
-            view = pyramid.level(scale)
-            cells = None
+            view, cells = pyramid.level(scale), None
+            best: NumberedCells | None = None
             for effort in EFFORTS:
                 found = self._find_cells(view, cells, effort, stages)
                 cells = found.cells
-                is_last = effort is EFFORTS[-1]
-                if is_last and found.is_small(view):
-                    break
-                if not is_last and not self._is_whole(found):
+                if found.is_small(view):
                     continue
                 numbering = stages.record("number", self._registration.number(view, *found))
-                if not isinstance(numbering, Refusal):
-                    return NumberedCells(found, numbering)
-                if numbering.reason != Reason.NO_PATTERN or failed.refusal.reason == Reason.NO_PATTERN:
-                    failed = Unnumbered(numbering, found)
+                if isinstance(numbering, Refusal):
+                    if numbering.reason != Reason.NO_PATTERN or failed.refusal.reason == Reason.NO_PATTERN:
+                        failed = Unnumbered(numbering, found)
+                elif best is None or numbering.count > best.numbering.count:
+                    best = NumberedCells(found, numbering)
+                if best is not None and self._is_whole(found):
+                    break
+            if best is not None:
+                return best
         return failed
 
     def _find_cells(
