@@ -230,8 +230,9 @@ class Extractor:
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (cells, mesh, _, _), numbering = found
-        triangles = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
-        triangles = stages.record("triangles", triangles.measured(fit_edges(pyramid.level(1), triangles.corner_px)))
+        expected = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
+        triangles = expected._replace(corner_px=fit_edges(pyramid.level(1), expected.corner_px))
+        triangles = stages.record("triangles", triangles)
         places = stages.record("place", merge_corners(triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
