@@ -92,6 +92,11 @@ class Unnumbered(NamedTuple):
     found: FoundCells | None = None
 
     @property
+    def weight(self) -> tuple[bool, int]:
+        """What orders reasons: that of a pattern first, then that of most cells."""
+        return self.refusal.reason != Reason.NO_PATTERN, 0 if self.found is None else self.found.count
+
+    @property
     def edge_px(self) -> float:
         """The median side of the linked cells; NaN without a pattern."""
         if self.found is None or self.refusal.reason == Reason.NO_PATTERN:
@@ -285,9 +290,9 @@ class Extractor:
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
         """Stages 2 to 7 at the coarsest scale that numbers cells, with as much effort as finds them all; else the reason
         where most cells were found."""
-        smallest = pyramid.level(_recognition_scales(pyramid.size)[0]).image
-        failed = Unnumbered(Refusal(Reason.NO_PATTERN if has_color(smallest) else Reason.NO_COLOR))
-        for scale in _recognition_scales(pyramid.size):
+        scales = _recognition_scales(pyramid.size)
+        failed = Unnumbered(Refusal(Reason.NO_PATTERN))
+        for scale in scales:
             view, cells = pyramid.level(scale), None
             best: NumberedCells | None = None
             for effort in EFFORTS:
@@ -297,15 +302,15 @@ class Extractor:
                     continue
                 numbering = stages.record("number", self._registration.number(view, *found))
                 if isinstance(numbering, Refusal):
-                    if numbering.reason != Reason.NO_PATTERN or failed.refusal.reason == Reason.NO_PATTERN:
-                        failed = Unnumbered(numbering, found)
+                    failed = max(failed, Unnumbered(numbering, found), key=lambda one: one.weight)
                 elif best is None or numbering.count > best.numbering.count:
                     best = NumberedCells(found, numbering)
                 if best is not None and self._is_whole(found):
                     break
             if best is not None:
                 return best
-        return failed
+        is_gray = not has_color(pyramid.level(scales[0]).image)
+        return Unnumbered(Refusal(Reason.NO_COLOR)) if is_gray else failed
 
     def _find_cells(
         self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages

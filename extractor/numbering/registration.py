@@ -423,18 +423,17 @@ def white_triangles(
     A drop, glare or a scratch hardly ever ends at the sides of a cell.
     """
     found = np.zeros(len(fields.whiteness), np.bool_)
-    vectors = cells.corner_px - cells.center_px[:, None]
     members = np.flatnonzero(cells.part == part)
-    least = WHITE.min_quality * float(np.median(quality[members]))
+    good = quality >= WHITE.min_quality * float(np.median(quality[members]))
     for n in np.flatnonzero(fields.whiteness > WHITE.bright)[:MAX_BRIGHT]:
-        place = fields.down_px[n]
-        distance = np.hypot(*(cells.center_px - place).T)
-        region, near = int(distance.argmin()), members[distance[members].argmin()]
-        edge = np.linalg.norm(vectors[near, 0] - vectors[near, 1])
-        if distance[region] > WHITE.center_reach * edge or quality[region] < least:
-            continue
-        misfits = [np.linalg.norm(vectors[region] + np.roll(vectors[near], k, axis=0), axis=1).max() for k in range(3)]
-        found[n] = min(misfits) < WHITE.corner_reach * edge
+        distance = np.hypot(*(cells.center_px - fields.down_px[n]).T)
+        near = members[distance[members].argmin()]
+        own = cells.corner_px[near] - cells.center_px[near]
+        edge = np.linalg.norm(own[0] - own[1])
+        here = good & (distance < WHITE.center_reach * edge)
+        corners = cells.corner_px[here] - cells.center_px[here, None]
+        apart = [np.linalg.norm(corners + np.roll(own, k, axis=0), axis=2).max(axis=1) for k in range(3)]
+        found[n] = (np.array(apart) < WHITE.corner_reach * edge).any()
     return found
 
 
