@@ -92,9 +92,10 @@ class Unnumbered(NamedTuple):
     found: FoundCells | None = None
 
     @property
-    def weight(self) -> tuple[bool, int]:
-        """What orders reasons: that of a pattern first, then that of most cells."""
-        return self.refusal.reason != Reason.NO_PATTERN, 0 if self.found is None else self.found.count
+    def weight(self) -> tuple[bool, bool, int]:
+        """What orders reasons: that of a pattern first, then a second white cell, then that of most cells."""
+        reason = self.refusal.reason
+        return reason != Reason.NO_PATTERN, reason == Reason.SEVERAL_PADS, self.found.count if self.found else 0
 
     @property
     def edge_px(self) -> float:
@@ -146,6 +147,12 @@ class Stages:
         self.results[name] = result
         self._last = now
         return result
+
+
+    def keep(self, found: FoundCells, numbering: Numbering) -> None:
+        """Keep the results of the look that was chosen, not of the last one."""
+        self.results |= {"seeds": found.cells, "mesh": found.mesh, "light": found.light, "walk": found.walk}
+        self.results["number"] = numbering
 
 
 class Extractor:
@@ -308,6 +315,7 @@ class Extractor:
                 if best is not None and self._is_whole(found):
                     break
             if best is not None:
+                stages.keep(best.found, best.numbering)
                 return best
         is_gray = not has_color(pyramid.level(scales[0]).image)
         return Unnumbered(Refusal(Reason.NO_COLOR)) if is_gray else failed
