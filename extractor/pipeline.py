@@ -243,8 +243,7 @@ class Extractor:
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (cells, mesh, _, _), numbering = found
         expected = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
-        triangles = expected._replace(corner_px=fit_edges(pyramid.level(1), expected.corner_px))
-        triangles = stages.record("triangles", triangles)
+        triangles = stages.record("triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px)))
         places = stages.record("place", merge_corners(triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
