@@ -185,11 +185,6 @@ class Numbering:
     lead: float
     fields: InkFields
 
-    @property
-    def count(self) -> int:
-        """Number of cells with a number."""
-        return int(np.count_nonzero(self.cell >= 0))
-
 
 @dataclass(frozen=True, eq=False)
 class Refusal:
