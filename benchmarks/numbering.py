@@ -3,7 +3,7 @@
     python -m benchmarks.numbering
 
 The article finds cells by hue and AGA, and numbers a graph of corners. The extractor finds cells by contrast, and
-registers the parts of a mesh of cells. A cell is right if it gets the layout's number, and wrong if it gets another one.
+registers the parts of a mesh of cells. A cell is right if it gets the layout's number, and wrong if it gets another.
 """
 
 from __future__ import annotations

@@ -14,7 +14,6 @@ from scipy.spatial import cKDTree
 
 from benchmarks.suites.article.corners import Triangles
 
-
 # L of eq. 5 in units of the shortest edge at either corner. Corners of different markers are at least one edge apart.
 MERGE_SHARE = 0.4
 # Two triangles that meet at a corner lie in different directions from it: the cosine between these is below this.
