@@ -92,6 +92,11 @@ class Unnumbered(NamedTuple):
     found: FoundCells | None = None
 
     @property
+    def weight(self) -> tuple[bool, int]:
+        """What orders reasons: that of a pattern first, then that of most cells."""
+        return self.refusal.reason != Reason.NO_PATTERN, 0 if self.found is None else self.found.count
+
+    @property
     def edge_px(self) -> float:
         """The median side of the linked cells; NaN without a pattern."""
         if self.found is None or self.refusal.reason == Reason.NO_PATTERN:
@@ -230,8 +235,9 @@ class Extractor:
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (cells, mesh, _, _), numbering = found
-        triangles = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
-        triangles = stages.record("triangles", triangles.measured(fit_edges(pyramid.level(1), triangles.corner_px)))
+        expected = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
+        triangles = expected._replace(corner_px=fit_edges(pyramid.level(1), expected.corner_px))
+        triangles = stages.record("triangles", triangles)
         places = stages.record("place", merge_corners(triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
@@ -282,27 +288,29 @@ class Extractor:
         return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
-        """Stages 2 to 7 at the coarsest scale, and with the least effort, that numbers the cells; else the reason where
-        most cells were found."""
-        smallest = pyramid.level(_recognition_scales(pyramid.size)[0]).image
-        failed = Unnumbered(Refusal(Reason.NO_PATTERN if has_color(smallest) else Reason.NO_COLOR))
-        for scale in _recognition_scales(pyramid.size):
-            view = pyramid.level(scale)
-            cells = None
+        """Stages 2 to 7 at the coarsest scale that numbers cells, with as much effort as finds them all; else the reason
+        where most cells were found."""
+        scales = _recognition_scales(pyramid.size)
+        failed = Unnumbered(Refusal(Reason.NO_PATTERN))
+        for scale in scales:
+            view, cells = pyramid.level(scale), None
+            best: NumberedCells | None = None
             for effort in EFFORTS:
                 found = self._find_cells(view, cells, effort, stages)
                 cells = found.cells
-                is_last = effort is EFFORTS[-1]
-                if is_last and found.is_small(view):
-                    break
-                if not is_last and not self._is_whole(found):
+                if found.is_small(view):
                     continue
                 numbering = stages.record("number", self._registration.number(view, *found))
-                if not isinstance(numbering, Refusal):
-                    return NumberedCells(found, numbering)
-                if numbering.reason != Reason.NO_PATTERN or failed.refusal.reason == Reason.NO_PATTERN:
-                    failed = Unnumbered(numbering, found)
-        return failed
+                if isinstance(numbering, Refusal):
+                    failed = max(failed, Unnumbered(numbering, found), key=lambda one: one.weight)
+                elif best is None or numbering.count > best.numbering.count:
+                    best = NumberedCells(found, numbering)
+                if best is not None and self._is_whole(found):
+                    break
+            if best is not None:
+                return best
+        is_gray = not has_color(pyramid.level(scales[0]).image)
+        return Unnumbered(Refusal(Reason.NO_COLOR)) if is_gray else failed
 
     def _find_cells(
         self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages

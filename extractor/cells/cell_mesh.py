@@ -29,7 +29,7 @@ class CellMeshLimits(NamedTuple):
 
     first_tolerance: float = 0.65
     tolerance: float = 0.4
-    direction_tolerance: float = 0.7
+    direction_tolerance: float = 0.56
     min_swelling: float = 0.6
     max_swelling: float = 1.6
 

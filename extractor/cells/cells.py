@@ -59,7 +59,7 @@ class CellLimits(NamedTuple):
     min_area_px: float = 12.0
     max_area_share: float = 1 / 30
     same_place: float = 0.42
-    min_contrast_deviations: float = 4.0
+    min_contrast_deviations: float = 7.0
     level_weight: float = 0.35
     tile_px: int = MIN_TILE_PX
 

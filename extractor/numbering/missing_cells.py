@@ -1,4 +1,4 @@
-"""Cells that no map showed as triangles, at their places between the numbered cells; their edges decide."""
+"""Cells that no map showed as triangles, at their places between the numbered cells."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ class MissingCellLimits(NamedTuple):
 
     Attributes:
         prior: of the map through the cells around.
-        min_neighbours: numbered cells that share a corner with a predicted one. Derived: three determine a map.
+        min_neighbours: numbered cells that share a corner with a predicted one; with those around them they determine a map.
+            Chosen.
     """
 
     prior: MapPrior = ATTACHMENT.prior
-    min_neighbours: int = 3
+    min_neighbours: int = 2
 
 
 LIMITS = MissingCellLimits()
@@ -35,22 +36,12 @@ class NumberedTriangles(NamedTuple):
         corner_px: (N, 3, 2) float64, clockwise in the image; NaN where no triangle is measured.
         cell: (N,) int32, the layout's cell.
         mirrored: the pattern is seen from its back.
-        found: the number of cells that were found; those behind are predicted.
     """
 
     center_px: NDArray[np.float64]
     corner_px: NDArray[np.float64]
     cell: NDArray[np.int32]
     mirrored: bool
-    found: int
-
-    def measured(self, corner_px: NDArray[np.float64]) -> NumberedTriangles:
-        """The cells with measured corners (N, 3, 2), NaN where there are none; predicted cells need them."""
-        kept = np.isfinite(corner_px[:, 0, 0])
-        kept[: self.found] = True
-        return NumberedTriangles(
-            self.center_px[kept], corner_px[kept], self.cell[kept], self.mirrored, self.found
-        )
 
 
 def with_missing_cells(
@@ -71,5 +62,5 @@ def with_missing_cells(
         predicted = predicted[:, ::-1]
     corners = np.concatenate([corners, predicted])
     return NumberedTriangles(
-        corners.mean(axis=1), corners, np.concatenate([cell, found]), numbering.mirrored, len(cell)
+        corners.mean(axis=1), corners, np.concatenate([cell, found]), numbering.mirrored
     )

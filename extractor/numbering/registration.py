@@ -35,6 +35,7 @@ MAX_TIED = 24  # motions between which the other parts may decide; chosen, for t
 OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
 JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
+MIN_NUMBERED_SHARE = 0.5  # of the cells of large parts; with fewer, all motions are compared. Chosen
 ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
 
 
@@ -64,20 +65,24 @@ class WhiteLimits(NamedTuple):
         dark: whiteness of a black cell; blurred and milky black stays below. Chosen.
         white_is_bright: probability that the white cell is bright. Chosen.
         white_is_dark: log odds against a dark place. Chosen.
+        usual_bright: number of bright black cells of an image in which none is seen. Chosen.
         is_triangle: more log odds for a bright place with the triangle of a down-cell. Chosen.
         max_without_triangle: log odds of any other bright place; a drop and glare are bright, too. Chosen.
         center_reach: in edges, from a down-cell's place to the center of this triangle. Chosen.
         corner_reach: in edges, between its corners and those of a cell turned around. Chosen.
+        min_quality: of this triangle, relative to the part's cells. Chosen.
     """
 
     bright: float = 0.6
     dark: float = 0.3
     white_is_bright: float = 0.9
     white_is_dark: float = -3.0
+    usual_bright: float = 0.2
     is_triangle: float = 3.0
     max_without_triangle: float = 3.0
     center_reach: float = 0.3
     corner_reach: float = 0.4
+    min_quality: float = 0.5
 
 
 class MapPrior(NamedTuple):
@@ -180,6 +185,11 @@ class Numbering:
     lead: float
     fields: InkFields
 
+    @property
+    def count(self) -> int:
+        """Number of cells with a number."""
+        return int(np.count_nonzero(self.cell >= 0))
+
 
 @dataclass(frozen=True, eq=False)
 class Refusal:
@@ -222,13 +232,19 @@ class _Placed(NamedTuple):
 
     seen: _Seen
     motions: Motions
-    other_whites: int  # white triangles at black cells of the layout by the best motion
+    white_axial: NDArray[np.int32]  # (W, 2) of the white triangles
+    other_whites: int  # of these, at black cells of the layout by the best motion
 
     @property
     def lead(self) -> float:
         scores = self.motions.score
         lead = float(scores[0] - scores[1]) if len(scores) > 1 else np.inf
         return lead - OTHER_WHITE * self.other_whites
+
+    @property
+    def is_own(self) -> NDArray[np.bool_]:
+        """(N,) bool, the part's cells."""
+        return self.seen.cells.part == self.seen.part
 
     @property
     def tied(self) -> NDArray[np.intp]:
@@ -272,13 +288,16 @@ class Registration:
         image = _WalkedImage(view, cells, mesh, light, walk)
         seen = [self._see(image, part) for part in large]
         bright = BrightPlaces.of([one.fields.whiteness for one in seen if isinstance(one, _Seen)])
-        found = [self._register(one, bright) if isinstance(one, _Seen) else one for one in seen]
+        found = [self._register(one, cells.quality, bright) if isinstance(one, _Seen) else one for one in seen]
         placed = [one for one in found if isinstance(one, _Placed)]
-        certain = next((one for one in placed if one.is_certain), None)
-        if certain is None and placed:
-            certain = self._with_all_parts(min(placed, key=lambda one: len(one.tied) or MAX_TIED))
-        if certain is not None:
-            return self._number_with(certain, [one for one in placed if one.seen.part != certain.seen.part])
+        certain = [one for one in placed if one.is_certain]
+        if placed and not certain:
+            fewest = min(placed, key=lambda one: len(one.tied) or MAX_TIED)
+            certain = self._with_all_parts(fewest, len(fewest.tied))
+        for one in certain:
+            numbering = self._number_with(one, placed)
+            if numbering is not None:
+                return numbering
         return found[0] if isinstance(found[0], Refusal) else Refusal(_uncertain_reason(found[0]), found[0].seen.fields)
 
     def _see(self, image: _WalkedImage, part: int) -> _Seen | Refusal:
@@ -305,15 +324,16 @@ class Registration:
             return Refusal(reason, fields)
         return _Seen(part, walked, fields, mirrored, NAMING_WEIGHT * (own - own.max()))
 
-    def _register(self, seen: _Seen, bright: BrightPlaces) -> _Placed:
-        """A part with its motions."""
+    def _register(self, seen: _Seen, quality: NDArray[np.float64], bright: BrightPlaces) -> _Placed:
+        """A part with its motions; quality (N,) of the image's cells."""
         fields = seen.fields
         axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
-        triangles = white_triangles(seen.cells, seen.part, fields)
+        triangles = white_triangles(seen.cells, quality, seen.part, fields)
         white = bright.white_odds(fields.whiteness, triangles)
         found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, WITNESSES)
         motions = Motions(*found)
-        return _Placed(seen, motions, self._other_whites(fields.down_axial[triangles], motions))
+        white_axial = fields.down_axial[triangles]
+        return _Placed(seen, motions, white_axial, self._other_whites(white_axial, motions))
 
     def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
         """The number of white triangles (W, 2) that the best motion carries to black cells of the layout."""
@@ -329,22 +349,24 @@ class Registration:
             count += (q, r) != (0, 0) and bool((beside >= 0).all())
         return count
 
-    def _with_all_parts(self, placed: _Placed) -> _Placed | None:
-        """The part with a certain motion, if the other parts decide between its best motions; None if they do not.
+    def _with_all_parts(self, placed: _Placed, count: int) -> list[_Placed]:
+        """The part with a certain motion, if the other parts decide between its best motions; else nothing.
 
         Under each motion the other parts are registered; a cell without a place counts as one outside the layout.
+
+        Args:
+            placed: the part.
+            count: number of its best motions that are compared.
         """
-        motions = placed.motions
-        tied = placed.tied
-        if not 0 < len(tied) <= MAX_TIED:
-            return None
+        if not 1 < count <= MAX_TIED:
+            return []
         parts = ATTACHMENT._replace(with_single_cells=False)
-        counts = np.array([np.count_nonzero(self._placed_cells(placed, k, parts) >= 0) for k in tied])
-        score = motions.score[tied] + WITNESSES.outside_weight * counts
+        counts = np.array([np.count_nonzero(self._placed_cells(placed, k, parts) >= 0) for k in range(count)])
+        score = placed.motions.score[:count] + WITNESSES.outside_weight * counts
         order = np.argsort(-score, kind="stable")
-        chosen = Motions(*(values[tied[order]] for values in motions))._replace(score=score[order])
-        decided = placed._replace(motions=chosen)
-        return decided if decided.lead >= JOINT_LEAD else None
+        chosen = Motions(*(values[order] for values in placed.motions))._replace(score=score[order])
+        decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
+        return [decided] if decided.lead >= JOINT_LEAD else []
 
     def _placed_cells(self, placed: _Placed, number: int, limits: AttachmentLimits = ATTACHMENT) -> NDArray[np.int32]:
         """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
@@ -360,14 +382,19 @@ class Registration:
         odd = is_odd(odds, self._lattice.ink[np.maximum(cell, 0)].astype(np.intp) - 1)
         return np.where(odd, -1, cell).astype(np.int32)
 
-    def _number_with(self, placed: _Placed, others: list[_Placed]) -> Numbering | Refusal:
-        """The numbers of all cells, by the part whose motion is certain; other parts may show another pad."""
+    def _number_with(self, placed: _Placed, parts: list[_Placed]) -> Numbering | Refusal | None:
+        """The numbers of all cells by the part whose motion is certain; none if the other parts contradict the motion."""
         cell = self._placed_cells(placed, 0)
-        for other in others:
-            if (cell[other.seen.cells.part == other.seen.part] >= 0).any():
-                continue
-            if other.is_certain and other.motions.white[0] > 0.0:
-                return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
+        sizes = np.array([[one.is_own.sum(), (cell[one.is_own] >= 0).sum()] for one in parts])
+        count, numbered = sizes.sum(axis=0)
+        if numbered < MIN_NUMBERED_SHARE * count:
+            first = next(one for one in parts if one.seen.part == placed.seen.part)
+            again = self._with_all_parts(first, len(first.motions.score))
+            if not again or (again[0].motions.motion[0] != placed.motions.motion[0]).any():
+                return None
+        others = [one for one, own in zip(parts, sizes, strict=True) if own[1] == 0]
+        if any(one.is_certain and one.motions.white[0] > 0.0 for one in others):
+            return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
         origin = Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
         return Numbering(cell, placed.seen.mirrored, origin, placed.lead, placed.seen.fields)
 
@@ -388,23 +415,25 @@ def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bo
     return np.asarray(odds[np.arange(len(odds)), own % 3] < ODD_INK)
 
 
-def white_triangles(cells: WalkedCells, part: int, fields: InkFields) -> NDArray[np.bool_]:
+def white_triangles(
+    cells: WalkedCells, quality: NDArray[np.float64], part: int, fields: InkFields
+) -> NDArray[np.bool_]:
     """(D,) bool, the bright down-cells at which a region was found that is a triangle as a down-cell is there.
 
     A drop, glare or a scratch hardly ever ends at the sides of a cell.
     """
     found = np.zeros(len(fields.whiteness), np.bool_)
-    vectors = cells.corner_px - cells.center_px[:, None]
     members = np.flatnonzero(cells.part == part)
+    good = quality >= WHITE.min_quality * float(np.median(quality[members]))
     for n in np.flatnonzero(fields.whiteness > WHITE.bright)[:MAX_BRIGHT]:
-        place = fields.down_px[n]
-        distance = np.hypot(*(cells.center_px - place).T)
-        region, near = int(distance.argmin()), members[distance[members].argmin()]
-        edge = np.linalg.norm(vectors[near, 0] - vectors[near, 1])
-        if distance[region] > WHITE.center_reach * edge:
-            continue
-        misfits = [np.linalg.norm(vectors[region] + np.roll(vectors[near], k, axis=0), axis=1).max() for k in range(3)]
-        found[n] = min(misfits) < WHITE.corner_reach * edge
+        distance = np.hypot(*(cells.center_px - fields.down_px[n]).T)
+        near = members[distance[members].argmin()]
+        own = cells.corner_px[near] - cells.center_px[near]
+        edge = np.linalg.norm(own[0] - own[1])
+        here = good & (distance < WHITE.center_reach * edge)
+        corners = cells.corner_px[here] - cells.center_px[here, None]
+        apart = [np.linalg.norm(corners + np.roll(own, k, axis=0), axis=2).max(axis=1) for k in range(3)]
+        found[n] = (np.array(apart) < WHITE.corner_reach * edge).any()
     return found
 
 
@@ -429,7 +458,7 @@ class BrightPlaces(NamedTuple):
     def white_odds(self, whiteness: NDArray[np.float64], is_triangle: NDArray[np.bool_]) -> NDArray[np.float64]:
         """(D,) log odds that a down-cell of this whiteness (D,) is the white one over a black one; NaN is unknown."""
         others = max(self.bright - 1, 0)
-        is_bright = np.log(WHITE.white_is_bright * (self.known + 1.0) / (others + 0.5))
+        is_bright = np.log(WHITE.white_is_bright * (self.known + 1.0) / (others + WHITE.usual_bright))
         bright, dark = whiteness > WHITE.bright, whiteness < WHITE.dark
         is_bright = np.where(is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
         odds = np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0))
