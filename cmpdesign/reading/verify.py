@@ -30,8 +30,8 @@ _SAMPLE_REACH = 0.35
 _MIN_CHROMA_SHARE = 0.4
 _SIDE_CAUSES = {
     "other_side": "a mirrored camera, the pad's other face, or an RGB image saved as BGR",
-    "mirrored": "a mirrored camera or the pad's other face, by the hues of the inks",
-    "swapped_channels": "red and blue are swapped, by the hues of the inks: an RGB image saved as BGR",
+    "mirrored": "a mirrored camera or the pad's other face, by the colors of the inks",
+    "swapped_channels": "red and blue are swapped, by the colors of the inks: an RGB image saved as BGR",
 }
 
 
