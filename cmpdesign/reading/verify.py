@@ -155,8 +155,11 @@ def _wrong_side_reason(reference: Reference, markers: Markers) -> str | None:
     from extractor.numbering.ink_fields import Palette
 
     viewed, designed = ("back", "front") if markers.mirrored else ("front", "back")
-    shares = markers.stages["number"].fields.shares[[0, 2, 1]]  # as the stated side numbers the classes
-    why = Palette(dict(reference.palette)).other_side_reason(shares)
+    fields = markers.stages["number"].fields
+    why = "other_side"
+    if fields is not None:
+        shares = fields.shares[[0, 2, 1]]  # as the stated side numbers the classes
+        why = Palette(dict(reference.palette)).other_side_reason(shares)
     remedy = f" ({parameter('channels', 'rgb')})" if why == "swapped_channels" else ""
     return (
         f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}: "

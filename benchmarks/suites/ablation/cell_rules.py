@@ -10,8 +10,8 @@ PIPELINE = (
         "cells are looked for with more effort where some are missing",
         "accuracy",
         "extractor/pipeline.py",
-        "if not is_last and not self._is_whole(found):",
-        "if False:",
+        "if best is not None and self._is_whole(found):",
+        "if best is not None:",
     ),
     Rule(
         "growing",
@@ -26,7 +26,7 @@ PIPELINE = (
         "small cells are read at a finer scale",
         "accuracy",
         "extractor/pipeline.py",
-        "if is_last and found.is_small(view):",
+        "if found.is_small(view):",
         "if False:",
     ),
 )
@@ -53,7 +53,7 @@ CELLS = (
         "a cell has more contrast than the noise",
         "no wrong id",
         "extractor/cells/cells.py",
-        "min_contrast_deviations: float = 4.0",
+        "min_contrast_deviations: float = 7.0",
         "min_contrast_deviations: float = 0.0",
     ),
     Rule(
@@ -85,7 +85,7 @@ CELLS = (
         "linked cells lie where each other's triangles expect them",
         "no wrong id",
         "extractor/cells/cell_mesh.py",
-        "direction_tolerance: float = 0.7",
+        "direction_tolerance: float = 0.56",
         "direction_tolerance: float = np.inf",
     ),
     Rule(
