@@ -92,9 +92,10 @@ class Unnumbered(NamedTuple):
     found: FoundCells | None = None
 
     @property
-    def weight(self) -> tuple[bool, int]:
-        """What orders reasons: that of a pattern first, then that of most cells."""
-        return self.refusal.reason != Reason.NO_PATTERN, 0 if self.found is None else self.found.count
+    def weight(self) -> tuple[bool, bool, int]:
+        """What orders reasons: that of a pattern first, then a second white cell, then that of most cells."""
+        reason = self.refusal.reason
+        return reason != Reason.NO_PATTERN, reason == Reason.SEVERAL_PADS, self.found.count if self.found else 0
 
     @property
     def edge_px(self) -> float:
@@ -146,6 +147,12 @@ class Stages:
         self.results[name] = result
         self._last = now
         return result
+
+
+    def keep(self, found: FoundCells, numbering: Numbering) -> None:
+        """Keep the results of the look that was chosen, not of the last one."""
+        self.results |= {"seeds": found.cells, "mesh": found.mesh, "light": found.light, "walk": found.walk}
+        self.results["number"] = numbering
 
 
 class Extractor:
@@ -236,8 +243,7 @@ class Extractor:
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (cells, mesh, _, _), numbering = found
         expected = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
-        triangles = expected._replace(corner_px=fit_edges(pyramid.level(1), expected.corner_px))
-        triangles = stages.record("triangles", triangles)
+        triangles = stages.record("triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px)))
         places = stages.record("place", merge_corners(triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
@@ -308,6 +314,7 @@ class Extractor:
                 if best is not None and self._is_whole(found):
                     break
             if best is not None:
+                stages.keep(best.found, best.numbering)
                 return best
         is_gray = not has_color(pyramid.level(scales[0]).image)
         return Unnumbered(Refusal(Reason.NO_COLOR)) if is_gray else failed

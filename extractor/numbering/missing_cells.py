@@ -1,4 +1,4 @@
-"""Cells that no map showed as triangles, at their places between the numbered cells."""
+"""Cells that no map showed as triangles, at their places between the numbered cells; their edges decide."""
 
 from __future__ import annotations
 
@@ -36,12 +36,22 @@ class NumberedTriangles(NamedTuple):
         corner_px: (N, 3, 2) float64, clockwise in the image; NaN where no triangle is measured.
         cell: (N,) int32, the layout's cell.
         mirrored: the pattern is seen from its back.
+        found: the number of cells that were found; those behind are predicted.
     """
 
     center_px: NDArray[np.float64]
     corner_px: NDArray[np.float64]
     cell: NDArray[np.int32]
     mirrored: bool
+    found: int
+
+    def measured(self, corner_px: NDArray[np.float64]) -> NumberedTriangles:
+        """The cells with measured corners (N, 3, 2), NaN where there are none; predicted cells need them."""
+        kept = np.isfinite(corner_px[:, 0, 0])
+        kept[: self.found] = True
+        return NumberedTriangles(
+            self.center_px[kept], corner_px[kept], self.cell[kept], self.mirrored, self.found
+        )
 
 
 def with_missing_cells(
@@ -62,5 +72,5 @@ def with_missing_cells(
         predicted = predicted[:, ::-1]
     corners = np.concatenate([corners, predicted])
     return NumberedTriangles(
-        corners.mean(axis=1), corners, np.concatenate([cell, found]), numbering.mirrored
+        corners.mean(axis=1), corners, np.concatenate([cell, found]), numbering.mirrored, len(cell)
     )

@@ -88,42 +88,46 @@ class Attachment {
     for (Index i = 0; i < cell.size(); ++i) {
       if (cell[i] >= 0) continue;
       if (cells.part[i] < 0) {
-        if (limits.with_single_cells) parts_.push_back({i});
+        parts_.push_back({i});
         continue;
       }
       const auto [found, is_new] = number.try_emplace(cells.part[i], parts_.size());
       if (is_new) parts_.emplace_back();
       parts_[found->second].push_back(i);
     }
-    tried_at_.resize(parts_.size());
+    tried_at_.resize(parts_.size(), -1.0);
   }
 
-  // Places parts, the nearest first, until none can be placed.
+  // Places parts until none can be placed; single cells are placed where no larger part can be.
   void place_all() {
-    for (std::int64_t round = 0; round < limits_.max_rounds; ++round) {
-      const PlacedCells placed(cells_, cell_);
-      if (placed.is_empty()) return;
-      std::vector<std::pair<double, std::size_t>> order;
-      for (std::size_t p = 0; p < parts_.size(); ++p)
-        if (!parts_[p].empty()) order.push_back({sort_by_distance(parts_[p], placed), p});
-      std::sort(order.begin(), order.end());
-      bool is_changed = false;
-      for (const auto& [distance, p] : order) {
-        // only a part beside newly placed cells is tried again
-        if (round > 0 && distance == tried_at_[p]) continue;
-        tried_at_[p] = distance;
-        if (place(parts_[p], placed)) {
-          parts_[p].clear();
-          is_changed = true;
-        }
-      }
-      if (!is_changed) return;
-    }
+    for (std::int64_t round = 0; round < limits_.max_rounds; ++round)
+      if (!place_some(false) && !(limits_.with_single_cells && place_some(true))) return;
   }
 
  private:
   double x(Index i) const { return cells_.center_px(i, 0); }
   double y(Index i) const { return cells_.center_px(i, 1); }
+
+  // Places parts, or single cells, beside the placed ones, the nearest first; returns whether any was placed.
+  bool place_some(bool is_single) {
+    const PlacedCells placed(cells_, cell_);
+    if (placed.is_empty()) return false;
+    std::vector<std::pair<double, std::size_t>> order;
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+      if (!parts_[p].empty() && (parts_[p].size() == 1) == is_single)
+        order.push_back({sort_by_distance(parts_[p], placed), p});
+    std::sort(order.begin(), order.end());
+    bool is_changed = false;
+    for (const auto& [distance, p] : order) {
+      // only a part beside newly placed cells is tried again
+      if (distance == tried_at_[p]) continue;
+      tried_at_[p] = distance;
+      if (!place(parts_[p], placed)) continue;
+      parts_[p].clear();
+      is_changed = true;
+    }
+    return is_changed;
+  }
 
   // Sorts the cells of a part by their distance from placed cells; returns the least.
   double sort_by_distance(std::vector<Index>& part, const PlacedCells& placed) const {
