@@ -60,7 +60,7 @@ def failures() -> tuple[Failure, ...]:
         Reason.NO_COLOR: gray,
         Reason.NO_PATTERN: out_of_focus,
         Reason.REFERENCE_LOST: covered_center,
-        Reason.AMBIGUOUS: two_white_cells,
+        Reason.AMBIGUOUS: two_bright_drops,
         Reason.SEVERAL_PADS: two_pads,
         Reason.OTHER_SIDE: other_side_in_other_inks,
         Reason.MIRRORED: mirrored,
@@ -96,15 +96,19 @@ def covered_center() -> Picture:
     return view(pitch_px=34.0, damage=Damage(blobs=(Blob((0.0, 0.8), 1.6, (60.0, 70.0, 80.0)),)))
 
 
-def two_white_cells() -> Picture:
-    """A black cell beside the centre is as bright as the white one, and a ring of dirt hides the rim."""
+def two_bright_drops() -> Picture:
+    """Drops on two black cells, the white cell under dirt, and a ring of dirt that hides the rim."""
     layout = pattern()
-    color = layout.cell_color.copy()
     centers_mm = layout.marker_xy_mm[layout.cell_corners].mean(axis=1)
-    other_mm = centers_mm[color == WHITE][0] + (1.5, -2.6)
-    black = np.flatnonzero(color == BLACK)
-    color[black[np.linalg.norm(centers_mm[black] - other_mm, axis=1).argmin()]] = WHITE
-    return framed(view(replace(layout, cell_color=color)), 60)
+    black_mm = centers_mm[layout.cell_color == BLACK]
+    white_mm = centers_mm[layout.cell_color == WHITE][0]
+    places = (white_mm + (1.5, -2.6), white_mm + (-1.5, -2.6))
+    drops = tuple(
+        Blob(tuple(black_mm[np.linalg.norm(black_mm - place, axis=1).argmin()]), 0.4, (240.0, 240.0, 240.0))
+        for place in places
+    )
+    dirt = Blob(tuple(white_mm), 0.8, (20.0, 20.0, 20.0))
+    return framed(view(damage=Damage(blobs=(*drops, dirt))), 60)
 
 
 def two_pads() -> Picture:
@@ -116,8 +120,8 @@ def mirrored() -> Picture:
 
 
 def other_side_in_other_inks() -> Picture:
-    """The back of a pattern whose inks have neither the palette's hues nor those with red and blue swapped."""
-    inks = {**pattern().palette, "red": "#c8642d", "green": "#28964c", "blue": "#2d6ebe"}
+    """The back of a pattern whose inks are as near to the palette's as to those with red and blue swapped."""
+    inks = {**pattern().palette, "red": "#c3372d", "green": "#329632", "blue": "#2d37c3"}
     return np.ascontiguousarray(view(replace(pattern(), palette=inks))[:, ::-1])
 
 
