@@ -51,7 +51,7 @@ MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sou
 EQUILATERAL_AREA = math.sqrt(3.0) / 4.0  # over the square of the side
 MAX_HOLE_SHARE = 0.02  # of a lattice that is not looked at more closely; chosen
 MIN_GAIN = 1.1  # in linked cells, of a look after which cells are looked for even more closely; chosen, for time
-MIN_HOLES = 7  # the same as a number: the white cell may hide its three neighbours. Chosen
+MIN_HOLES = 5  # the same as a number: the white cell may hide its three neighbours. Chosen
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]
