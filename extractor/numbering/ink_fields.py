@@ -40,6 +40,7 @@ class InkFieldLimits(NamedTuple):
         across_side: share of the way from its center to those of the cells beside it, from which on these are not white.
             Chosen: the side lies at a half.
         corner_likeness: of the light of the center, the largest difference there. Chosen.
+        likeness: of a field's light, the largest difference of a cell that is like it. Chosen.
         robust_rounds: fits of a field, the first ones of lower degrees. Chosen.
         quadratic_cells, linear_cells: of a field, from which on its degree is 2 or 1. Derived: three cells for each
             coefficient.
@@ -54,6 +55,7 @@ class InkFieldLimits(NamedTuple):
     towards_corner: float = 0.55
     across_side: float = 0.78
     corner_likeness: float = 0.5
+    likeness: float = 0.5
     robust_rounds: int = 4
     quadratic_cells: int = 18
     linear_cells: int = 9
@@ -75,6 +77,7 @@ class InkFields:
             the image.
         is_triangle: (D,) bool, the bright ones of which the light fills the triangle, and no cell beside it; a drop, glare
             or a scratch hardly ever ends at the sides of a cell.
+        fit: the share of the part's cells whose color is like that of their class's field.
     """
 
     shares: NDArray[np.float64]
@@ -82,6 +85,7 @@ class InkFields:
     down_axial: NDArray[np.int32]
     whiteness: NDArray[np.float64]
     is_triangle: NDArray[np.bool_]
+    fit: float
 
 
 class Palette:

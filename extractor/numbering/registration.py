@@ -27,8 +27,7 @@ MIN_LAYOUT_SHARE = 0.06  # of the layout's cells, of a part that gives the origi
 MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; chosen
 MAX_PARTS = 4  # that are tried for the origin, the largest; chosen
 NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
-MIN_CLASS_FIT = 0.55  # of the classes to the colors; two inks that look alike have two thirds. Chosen
-MIN_SIDE_FIT = 0.8  # the same, of a pattern whose side is refused; chosen
+MIN_FIT = 0.75  # of the colors of the three classes; tilings of other inks have half. Chosen
 SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
 MAX_TIED = 60  # motions between which the other parts may decide; chosen, for time
 OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
@@ -291,8 +290,7 @@ class Registration:
         mirrored = bool(self._mirrored)
         walked = image.seen_from(mirrored)
         fields = ink_fields(image.view, walked, image.light, part)
-        fit = class_fit(fields, walked, part)
-        if fit < MIN_CLASS_FIT:
+        if fields.fit < MIN_FIT:
             return Refusal(Reason.NO_PATTERN, fields)
         own, other = self._palette.naming(fields.shares), self._palette.naming(fields.shares, other_side=True)
         lead = float(other.max() - own.max())
@@ -302,13 +300,13 @@ class Registration:
             fields = ink_fields(image.view, walked, image.light, part)
             own = self._palette.naming(fields.shares)
         is_other = abs(lead) < SIDE_LEAD if self._mirrored is None else lead > SIDE_LEAD
-        if is_other and fit < MIN_SIDE_FIT:
-            return Refusal(Reason.NO_PATTERN, fields)
         if is_other:
             known = self._mirrored is not None
             reason = self._palette.other_side_reason(fields.shares) if known else Reason.OTHER_SIDE
             return Refusal(reason, fields)
-        return _Seen(part, walked, fields, mirrored, NAMING_WEIGHT * (own - own.max()))
+        naming = NAMING_WEIGHT * (own - own.max())
+        # where all classes look alike it is the tiling of another pattern, or the light shows no ink
+        return _Seen(part, walked, fields, mirrored, naming) if naming.min() < -LEAD else Refusal(Reason.NO_PATTERN, fields)
 
     def _register(self, seen: _Seen, bright: BrightPlaces) -> _Placed:
         """A part with its motions."""
@@ -382,13 +380,6 @@ class Registration:
             return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
         origin = Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
         return Numbering(cell, placed.seen.mirrored, origin, placed.lead, placed.seen.fields)
-
-
-def class_fit(fields: InkFields, cells: WalkedCells, part: int) -> float:
-    """The share of a part's cells whose color is the likeliest for their own class; a third by chance."""
-    own = cells.part == part
-    classes = (cells.axial[own, 0] - cells.axial[own, 1]) % 3
-    return float((fields.odds[own][np.arange(len(classes)), classes] == 0.0).mean())
 
 
 def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bool_]:

@@ -274,6 +274,19 @@ class DownLight {
   std::vector<Color> light_;
 };
 
+// The share of a part's cells whose color is like that of their class's field.
+double fit_of(const std::vector<ColorField>& fields, const WalkedCells& cells, const std::vector<Color>& light,
+              const std::vector<Index>& members, const InkFieldLimits& limits) {
+  double count = 0.0, alike = 0.0;
+  for (const Index i : members) {
+    if (!std::isfinite(light[i][0])) continue;
+    const Color field = fields[class_of({cells.axial(i, 0), cells.axial(i, 1)})].at(cells.center_px(i, 0), cells.center_px(i, 1));
+    count += 1.0;
+    alike += distance(light[i], field) < limits.likeness * distance(field, {});
+  }
+  return count > 0.0 ? alike / count : 0.0;
+}
+
 std::vector<Color> as_colors(View<const double, 2> light) {
   std::vector<Color> out;
   for (Index i = 0; i < light.size(); ++i) out.push_back({light(i, 0), light(i, 1), light(i, 2)});
@@ -327,7 +340,7 @@ InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, 
   }
   auto [whiteness, is_triangle] = DownLight(view, down, fields, limits).whiteness();
   return {shares_of(fields, cells.center_px, members, limits), odds_of(fields, cells.center_px, light, limits),
-          std::move(axial), std::move(whiteness), std::move(is_triangle)};
+          std::move(axial), std::move(whiteness), std::move(is_triangle), fit_of(fields, cells, light, members, limits)};
 }
 
 }  // namespace cmp::numbering
