@@ -50,7 +50,8 @@ WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is t
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
 EQUILATERAL_AREA = math.sqrt(3.0) / 4.0  # over the square of the side
 MAX_HOLE_SHARE = 0.02  # of a lattice that is not looked at more closely; chosen
-MIN_HOLES = 4  # the same as a number: the white cell may hide its three neighbours. Chosen
+MIN_GAIN = 1.1  # in linked cells, of a look after which cells are looked for even more closely; chosen, for time
+MIN_HOLES = 5  # the same as a number: the white cell may hide its three neighbours. Chosen
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]
@@ -149,10 +150,9 @@ class Stages:
         return result
 
 
-    def keep(self, found: FoundCells, numbering: Numbering) -> None:
-        """Keep the results of the look that was chosen, not of the last one."""
+    def keep(self, found: FoundCells) -> None:
+        """Keep the results of the look that was numbered, not of the last one."""
         self.results |= {"seeds": found.cells, "mesh": found.mesh, "light": found.light, "walk": found.walk}
-        self.results["number"] = numbering
 
 
 class Extractor:
@@ -294,30 +294,30 @@ class Extractor:
         return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
-        """Stages 2 to 7 at the coarsest scale that numbers cells, with as much effort as finds them all; else the reason
-        where most cells were found."""
+        """Stages 2 to 7 at the coarsest scale that numbers cells, in the last look that does; else the reason where most
+        cells were found."""
         scales = _recognition_scales(pyramid.size)
         failed = Unnumbered(Refusal(Reason.NO_PATTERN))
         for scale in scales:
-            view, cells = pyramid.level(scale), None
-            best: NumberedCells | None = None
-            for effort in EFFORTS:
-                found = self._find_cells(view, cells, effort, stages)
-                cells = found.cells
-                if found.is_small(view):
-                    continue
+            view = pyramid.level(scale)
+            for found in reversed(self._looks(view, stages)):
                 numbering = stages.record("number", self._registration.number(view, *found))
-                if isinstance(numbering, Refusal):
-                    failed = max(failed, Unnumbered(numbering, found), key=lambda one: one.weight)
-                elif best is None or numbering.count > best.numbering.count:
-                    best = NumberedCells(found, numbering)
-                if best is not None and self._is_whole(found):
-                    break
-            if best is not None:
-                stages.keep(best.found, best.numbering)
-                return best
+                if not isinstance(numbering, Refusal):
+                    stages.keep(found)
+                    return NumberedCells(found, numbering)
+                failed = max(failed, Unnumbered(numbering, found), key=lambda one: one.weight)
         is_gray = not has_color(pyramid.level(scales[0]).image)
         return Unnumbered(Refusal(Reason.NO_COLOR)) if is_gray else failed
+
+    def _looks(self, view: PyramidLevel, stages: Stages) -> list[FoundCells]:
+        """The cells at one scale, each time with more effort, until all seem to be found; none if they are too small."""
+        looks: list[FoundCells] = []
+        for effort in EFFORTS:
+            before = looks[-1] if looks else None
+            looks.append(self._find_cells(view, before.cells if before else None, effort, stages))
+            if self._is_whole(looks[-1]) or (before and looks[-1].count < MIN_GAIN * before.count):
+                break
+        return [one for one in looks if not one.is_small(view)]
 
     def _find_cells(
         self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages

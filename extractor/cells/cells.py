@@ -84,7 +84,7 @@ class Effort(NamedTuple):
 EFFORTS = (
     Effort(4, np.array([0.5])),
     Effort(7, np.array([0.32, 0.5, 0.65])),
-    Effort(7, np.array([0.15, 0.22, 0.42, 0.58, 0.72, 0.85])),
+    Effort(7, np.array([0.2, 0.42, 0.75])),
 )
 
 

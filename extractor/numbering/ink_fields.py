@@ -34,6 +34,10 @@ class InkFieldLimits(NamedTuple):
         residual_scale: in median residuals, at which a cell has half of its weight in the fit of a field. Chosen.
         least_share: of the strongest field, the least of another one, to take its logarithm. Chosen.
         least_scatter: of a field's light, the least scatter of cells. Chosen.
+        bright: whiteness of a down-cell that is not black. Chosen.
+        towards_corner: share of the way from its center to its corners, up to which a white cell is white. Chosen: beyond
+            it is blurred.
+        corner_likeness: of the light of the center, the largest difference there. Chosen.
         robust_rounds: fits of a field, the first ones of lower degrees. Chosen.
         quadratic_cells, linear_cells: of a field, from which on its degree is 2 or 1. Derived: three cells for each
             coefficient.
@@ -44,6 +48,9 @@ class InkFieldLimits(NamedTuple):
     residual_scale: float = 2.0
     least_share: float = 0.02
     least_scatter: float = 0.15
+    bright: float = 0.6
+    towards_corner: float = 0.55
+    corner_likeness: float = 0.5
     robust_rounds: int = 4
     quadratic_cells: int = 18
     linear_cells: int = 9
@@ -61,16 +68,17 @@ class InkFields:
         odds: (N, 3) float64, the log likelihoods of each cell of the image for the three classes, relative to the
             likeliest one.
         down_axial: (D, 2) int32, the part's down-cells: the black ones and the white one.
-        down_px: (D, 2) float64, their places.
         whiteness: (D,) float64, their light over the black around, relative to the strongest inks there; NaN outside
             the image.
+        is_triangle: (D,) bool, the bright ones of which the light fills the triangle, and no cell beside it; a drop, glare
+            or a scratch hardly ever ends at the sides of a cell.
     """
 
     shares: NDArray[np.float64]
     odds: NDArray[np.float64]
     down_axial: NDArray[np.int32]
-    down_px: NDArray[np.float64]
     whiteness: NDArray[np.float64]
+    is_triangle: NDArray[np.bool_]
 
 
 class Palette:

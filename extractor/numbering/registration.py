@@ -19,7 +19,7 @@ from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
-from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
+from extractor.numbering.ink_fields import LIMITS, InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.result import Origin, Reason
 
@@ -30,7 +30,6 @@ NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
 MIN_CLASS_FIT = 0.55  # of the classes to the colors; two inks that look alike have two thirds. Chosen
 MIN_SIDE_FIT = 0.8  # the same, of a pattern whose side is refused; chosen
 SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
-MAX_BRIGHT = 12  # bright places that are looked at; with more of them none is evidence. Chosen
 MAX_TIED = 24  # motions between which the other parts may decide; chosen, for time
 OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
@@ -61,28 +60,20 @@ class WhiteLimits(NamedTuple):
     """The witness of the white cell.
 
     Attributes:
-        bright: whiteness of a down-cell that is not black. Chosen.
         dark: whiteness of a black cell; blurred and milky black stays below. Chosen.
         white_is_bright: probability that the white cell is bright. Chosen.
         white_is_dark: log odds against a dark place. Chosen.
         usual_bright: number of bright black cells of an image in which none is seen. Chosen.
         is_triangle: more log odds for a bright place with the triangle of a down-cell. Chosen.
         max_without_triangle: log odds of any other bright place; a drop and glare are bright, too. Chosen.
-        center_reach: in edges, from a down-cell's place to the center of this triangle. Chosen.
-        corner_reach: in edges, between its corners and those of a cell turned around. Chosen.
-        min_quality: of this triangle, relative to the part's cells. Chosen.
     """
 
-    bright: float = 0.6
     dark: float = 0.3
     white_is_bright: float = 0.9
     white_is_dark: float = -3.0
     usual_bright: float = 0.2
     is_triangle: float = 3.0
     max_without_triangle: float = 3.0
-    center_reach: float = 0.3
-    corner_reach: float = 0.4
-    min_quality: float = 0.5
 
 
 class MapPrior(NamedTuple):
@@ -185,11 +176,6 @@ class Numbering:
     lead: float
     fields: InkFields
 
-    @property
-    def count(self) -> int:
-        """Number of cells with a number."""
-        return int(np.count_nonzero(self.cell >= 0))
-
 
 @dataclass(frozen=True, eq=False)
 class Refusal:
@@ -288,7 +274,7 @@ class Registration:
         image = _WalkedImage(view, cells, mesh, light, walk)
         seen = [self._see(image, part) for part in large]
         bright = BrightPlaces.of([one.fields.whiteness for one in seen if isinstance(one, _Seen)])
-        found = [self._register(one, cells.quality, bright) if isinstance(one, _Seen) else one for one in seen]
+        found = [self._register(one, bright) if isinstance(one, _Seen) else one for one in seen]
         placed = [one for one in found if isinstance(one, _Placed)]
         certain = [one for one in placed if one.is_certain]
         if placed and not certain:
@@ -324,15 +310,14 @@ class Registration:
             return Refusal(reason, fields)
         return _Seen(part, walked, fields, mirrored, NAMING_WEIGHT * (own - own.max()))
 
-    def _register(self, seen: _Seen, quality: NDArray[np.float64], bright: BrightPlaces) -> _Placed:
-        """A part with its motions; quality (N,) of the image's cells."""
+    def _register(self, seen: _Seen, bright: BrightPlaces) -> _Placed:
+        """A part with its motions."""
         fields = seen.fields
         axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
-        triangles = white_triangles(seen.cells, quality, seen.part, fields)
-        white = bright.white_odds(fields.whiteness, triangles)
+        white = bright.white_odds(fields)
         found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, WITNESSES)
         motions = Motions(*found)
-        white_axial = fields.down_axial[triangles]
+        white_axial = fields.down_axial[fields.is_triangle]
         return _Placed(seen, motions, white_axial, self._other_whites(white_axial, motions))
 
     def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
@@ -415,28 +400,6 @@ def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bo
     return np.asarray(odds[np.arange(len(odds)), own % 3] < ODD_INK)
 
 
-def white_triangles(
-    cells: WalkedCells, quality: NDArray[np.float64], part: int, fields: InkFields
-) -> NDArray[np.bool_]:
-    """(D,) bool, the bright down-cells at which a region was found that is a triangle as a down-cell is there.
-
-    A drop, glare or a scratch hardly ever ends at the sides of a cell.
-    """
-    found = np.zeros(len(fields.whiteness), np.bool_)
-    members = np.flatnonzero(cells.part == part)
-    good = quality >= WHITE.min_quality * float(np.median(quality[members]))
-    for n in np.flatnonzero(fields.whiteness > WHITE.bright)[:MAX_BRIGHT]:
-        distance = np.hypot(*(cells.center_px - fields.down_px[n]).T)
-        near = members[distance[members].argmin()]
-        own = cells.corner_px[near] - cells.center_px[near]
-        edge = np.linalg.norm(own[0] - own[1])
-        here = good & (distance < WHITE.center_reach * edge)
-        corners = cells.corner_px[here] - cells.center_px[here, None]
-        apart = [np.linalg.norm(corners + np.roll(own, k, axis=0), axis=2).max(axis=1) for k in range(3)]
-        found[n] = (np.array(apart) < WHITE.corner_reach * edge).any()
-    return found
-
-
 class BrightPlaces(NamedTuple):
     """How often a down-cell of an image is bright: the white cell, and black cells under glare, dirt and scratches.
 
@@ -452,15 +415,16 @@ class BrightPlaces(NamedTuple):
     def of(parts: list[NDArray[np.float64]]) -> BrightPlaces:
         """Of the whiteness (D,) of the down-cells of each part."""
         return BrightPlaces(
-            sum(int(np.isfinite(one).sum()) for one in parts), sum(int((one > WHITE.bright).sum()) for one in parts)
+            sum(int(np.isfinite(one).sum()) for one in parts), sum(int((one > LIMITS.bright).sum()) for one in parts)
         )
 
-    def white_odds(self, whiteness: NDArray[np.float64], is_triangle: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(D,) log odds that a down-cell of this whiteness (D,) is the white one over a black one; NaN is unknown."""
+    def white_odds(self, fields: InkFields) -> NDArray[np.float64]:
+        """(D,) log odds that a down-cell is the white one over a black one; NaN is unknown."""
+        whiteness = fields.whiteness
         others = max(self.bright - 1, 0)
         is_bright = np.log(WHITE.white_is_bright * (self.known + 1.0) / (others + WHITE.usual_bright))
-        bright, dark = whiteness > WHITE.bright, whiteness < WHITE.dark
-        is_bright = np.where(is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
+        bright, dark = whiteness > LIMITS.bright, whiteness < WHITE.dark
+        is_bright = np.where(fields.is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
         odds = np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0))
         return np.where(np.isfinite(whiteness), odds, np.nan)
 

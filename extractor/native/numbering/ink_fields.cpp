@@ -186,33 +186,93 @@ Array<double, 2> odds_of(const std::vector<ColorField>& fields, View<const doubl
   return odds;
 }
 
-// (D,) the light of the down-cells over that of the down-cells around, relative to the strongest inks there.
-Array<double, 1> whiteness_of(const image::PyramidLevel& view, const DownCells& down,
-                              const std::vector<ColorField>& fields) {
-  const auto light = light_at_points(view, down.xy());
-  const Color usual = median_color(light);
-  Array<double, 1> whiteness({down.size()}, NOWHERE);
-  std::vector<Color> around;
-  for (Index n = 0; n < down.size(); ++n) {
-    if (!std::isfinite(light[n][0])) continue;
-    around.clear();
-    for (const auto& step : NEIGHBOURS) {
-      const std::int32_t other = down.number(down.q(n) + step[0], down.r(n) + step[1]);
-      if (other >= 0 && std::isfinite(light[other][0])) around.push_back(light[other]);
-    }
-    const Color over = difference(light[n], around.size() < 2 ? usual : median_color(around));
-    double own = 0.0, most = 0.0;
-    for (Index c = 0; c < CHANNELS; ++c) {
-      double strongest = 0.0;
-      for (const ColorField& field : fields)
-        strongest = std::max(strongest, field.at(down.xy()(n, 0), down.xy()(n, 1))[c]);
-      own += over[c];
-      most += strongest;
-    }
-    whiteness[n] = own / std::max(most, 1e-6);
-  }
-  return whiteness;
+double distance(const Color& a, const Color& b) {
+  return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
 }
+
+// From a down-cell's center to those of the up-cells that share its sides, in steps of the lattice; its corners lie on the
+// other sides.
+constexpr double THIRD = 1.0 / 3.0;
+constexpr double SIDE_STEPS[SIDES][2] = {{2 * THIRD, -THIRD}, {-THIRD, -THIRD}, {-THIRD, 2 * THIRD}};
+constexpr Index SIDE_CLASS[SIDES] = {0, 2, 1};  // of these up-cells, relative to the class of the first
+
+// The down-cells' light.
+class DownLight {
+ public:
+  DownLight(const image::PyramidLevel& view, const DownCells& down, const std::vector<ColorField>& fields,
+            const InkFieldLimits& limits)
+      : view_(view), down_(down), fields_(fields), limits_(limits), light_(light_at_points(view, down.xy())) {}
+
+  // (D,) light over that of the down-cells around, relative to the strongest inks there; NaN outside the image. (D,)
+  // whether the light fills the triangle of a bright down-cell, and no cell beside it.
+  std::pair<Array<double, 1>, Array<bool, 1>> whiteness() const {
+    const Color usual = median_color(light_);
+    Array<double, 1> whiteness({down_.size()}, NOWHERE);
+    Array<bool, 1> is_triangle({down_.size()}, false);
+    std::vector<Color> around;
+    for (Index n = 0; n < down_.size(); ++n) {
+      if (!std::isfinite(light_[n][0])) continue;
+      around.clear();
+      for (const auto& step : NEIGHBOURS) {
+        const std::int32_t other = down_.number(down_.q(n) + step[0], down_.r(n) + step[1]);
+        if (other >= 0 && std::isfinite(light_[other][0])) around.push_back(light_[other]);
+      }
+      const Color black = around.size() < 2 ? usual : median_color(around), over = difference(light_[n], black);
+      double own = 0.0, most = 0.0;
+      for (Index c = 0; c < CHANNELS; ++c) {
+        double strongest = 0.0;
+        for (const ColorField& field : fields_)
+          strongest = std::max(strongest, field.at(down_.xy()(n, 0), down_.xy()(n, 1))[c]);
+        own += over[c];
+        most += strongest;
+      }
+      whiteness[n] = own / std::max(most, 1e-6);
+      is_triangle[n] = whiteness[n] > limits_.bright && fills_triangle(n, black, over);
+    }
+    return {std::move(whiteness), std::move(is_triangle)};
+  }
+
+ private:
+  // The step of the lattice from a down-cell, px, by the down-cells on both sides; NaN without any.
+  std::array<double, 2> step_px(Index n, Index dq, Index dr) const {
+    double x = 0.0, y = 0.0, count = 0.0;
+    for (const Index sign : {1, -1}) {
+      const std::int32_t other = down_.number(down_.q(n) + sign * dq, down_.r(n) + sign * dr);
+      if (other < 0) continue;
+      x += static_cast<double>(sign) * (down_.xy()(other, 0) - down_.xy()(n, 0));
+      y += static_cast<double>(sign) * (down_.xy()(other, 1) - down_.xy()(n, 1));
+      count += 1.0;
+    }
+    return {x / count, y / count};
+  }
+  // Whether the light of a down-cell reaches towards its corners, and the cells beside it have their own inks.
+  bool fills_triangle(Index n, const Color& black, const Color& white) const {
+    const auto u = step_px(n, 1, 0), v = step_px(n, 0, 1);
+    Array<double, 2> xy({2 * SIDES, 2});
+    for (Index k = 0; k < SIDES; ++k)
+      for (int axis = 0; axis < 2; ++axis) {
+        const double way = SIDE_STEPS[k][0] * u[axis] + SIDE_STEPS[k][1] * v[axis];
+        xy(k, axis) = down_.xy()(n, axis) - limits_.towards_corner * way;
+        xy(SIDES + k, axis) = down_.xy()(n, axis) + way;
+      }
+    const auto light = light_at_points(view_, xy);
+    const Index first = class_of({static_cast<std::int32_t>(down_.q(n)), static_cast<std::int32_t>(down_.r(n))});
+    const double full = distance(white, {});
+    for (Index k = 0; k < SIDES; ++k) {
+      const Color corner = difference(light[k], black), beside = difference(light[SIDES + k], black);
+      if (!(distance(corner, white) < limits_.corner_likeness * full)) return false;
+      const Color ink = fields_[(first + SIDE_CLASS[k]) % CLASSES].at(xy(SIDES + k, 0), xy(SIDES + k, 1));
+      if (!(distance(beside, ink) < distance(beside, white))) return false;
+    }
+    return true;
+  }
+
+  const image::PyramidLevel& view_;
+  const DownCells& down_;
+  const std::vector<ColorField>& fields_;
+  const InkFieldLimits& limits_;
+  std::vector<Color> light_;
+};
 
 std::vector<Color> as_colors(View<const double, 2> light) {
   std::vector<Color> out;
@@ -265,8 +325,9 @@ InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, 
     axial(n, 0) = static_cast<std::int32_t>(down.q(n));
     axial(n, 1) = static_cast<std::int32_t>(down.r(n));
   }
+  auto [whiteness, is_triangle] = DownLight(view, down, fields, limits).whiteness();
   return {shares_of(fields, cells.center_px, members, limits), odds_of(fields, cells.center_px, light, limits),
-          std::move(axial), Array<double, 2>(down.xy()), whiteness_of(view, down, fields)};
+          std::move(axial), std::move(whiteness), std::move(is_triangle)};
 }
 
 }  // namespace cmp::numbering
