@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -294,13 +295,12 @@ class Extractor:
         return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
-        """Stages 2 to 7 at the coarsest scale that numbers cells, in the last look that does; else the reason where most
-        cells were found."""
+        """Stages 2 to 7 at the coarsest scale that numbers cells; else the reason where most cells were found."""
         scales = _recognition_scales(pyramid.size)
         failed = Unnumbered(Refusal(Reason.NO_PATTERN))
         for scale in scales:
             view = pyramid.level(scale)
-            for found in reversed(self._looks(view, stages)):
+            for found in self._looks(view, stages):
                 numbering = stages.record("number", self._registration.number(view, *found))
                 if not isinstance(numbering, Refusal):
                     stages.keep(found)
@@ -309,15 +309,22 @@ class Extractor:
         is_gray = not has_color(pyramid.level(scales[0]).image)
         return Unnumbered(Refusal(Reason.NO_COLOR)) if is_gray else failed
 
-    def _looks(self, view: PyramidLevel, stages: Stages) -> list[FoundCells]:
-        """The cells at one scale, each time with more effort, until all seem to be found; none if they are too small."""
-        looks: list[FoundCells] = []
+    def _looks(self, view: PyramidLevel, stages: Stages) -> Iterator[FoundCells]:
+        """The cells at one scale with more and more effort: first the looks in which all seem to be found, or that gain
+        little, then the others, the last one first. Looks with too small cells are left out."""
+        skipped: list[FoundCells] = []
+        before: FoundCells | None = None
         for effort in EFFORTS:
-            before = looks[-1] if looks else None
-            looks.append(self._find_cells(view, before.cells if before else None, effort, stages))
-            if self._is_whole(looks[-1]) or (before and looks[-1].count < MIN_GAIN * before.count):
-                break
-        return [one for one in looks if not one.is_small(view)]
+            found = self._find_cells(view, before.cells if before else None, effort, stages)
+            gains = before is None or found.count >= MIN_GAIN * before.count
+            before = found
+            if found.is_small(view):
+                continue
+            if gains and effort is not EFFORTS[-1] and not self._is_whole(found):
+                skipped.append(found)
+            else:
+                yield found
+        yield from reversed(skipped)
 
     def _find_cells(
         self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages

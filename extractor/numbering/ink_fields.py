@@ -37,6 +37,8 @@ class InkFieldLimits(NamedTuple):
         bright: whiteness of a down-cell that is not black. Chosen.
         towards_corner: share of the way from its center to its corners, up to which a white cell is white. Chosen: beyond
             it is blurred.
+        across_side: share of the way from its center to those of the cells beside it, from which on these are not white.
+            Chosen: the side lies at a half.
         corner_likeness: of the light of the center, the largest difference there. Chosen.
         robust_rounds: fits of a field, the first ones of lower degrees. Chosen.
         quadratic_cells, linear_cells: of a field, from which on its degree is 2 or 1. Derived: three cells for each
@@ -50,6 +52,7 @@ class InkFieldLimits(NamedTuple):
     least_scatter: float = 0.15
     bright: float = 0.6
     towards_corner: float = 0.55
+    across_side: float = 0.78
     corner_likeness: float = 0.5
     robust_rounds: int = 4
     quadratic_cells: int = 18

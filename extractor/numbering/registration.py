@@ -30,7 +30,7 @@ NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
 MIN_CLASS_FIT = 0.55  # of the classes to the colors; two inks that look alike have two thirds. Chosen
 MIN_SIDE_FIT = 0.8  # the same, of a pattern whose side is refused; chosen
 SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
-MAX_TIED = 24  # motions between which the other parts may decide; chosen, for time
+MAX_TIED = 60  # motions between which the other parts may decide; chosen, for time
 OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
 JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
@@ -53,7 +53,7 @@ class WitnessLimits(NamedTuple):
     max_outside_share: float = 0.1
     min_outside: int = 3
     trimmed_share: float = 0.03
-    max_motions: int = 60
+    max_motions: int = 100
 
 
 class WhiteLimits(NamedTuple):
@@ -72,7 +72,7 @@ class WhiteLimits(NamedTuple):
     white_is_bright: float = 0.9
     white_is_dark: float = -3.0
     usual_bright: float = 0.2
-    is_triangle: float = 3.0
+    is_triangle: float = 4.0
     max_without_triangle: float = 3.0
 
 

@@ -253,7 +253,7 @@ class DownLight {
       for (int axis = 0; axis < 2; ++axis) {
         const double way = SIDE_STEPS[k][0] * u[axis] + SIDE_STEPS[k][1] * v[axis];
         xy(k, axis) = down_.xy()(n, axis) - limits_.towards_corner * way;
-        xy(SIDES + k, axis) = down_.xy()(n, axis) + way;
+        xy(SIDES + k, axis) = down_.xy()(n, axis) + limits_.across_side * way;
       }
     const auto light = light_at_points(view_, xy);
     const Index first = class_of({static_cast<std::int32_t>(down_.q(n)), static_cast<std::int32_t>(down_.r(n))});

@@ -12,13 +12,13 @@ namespace cmp::numbering {
 // The limits of the fields; the Python module explains them.
 struct InkFieldLimits {
   double place_softening, place_reach2, residual_scale, least_share, least_scatter, bright, towards_corner,
-      corner_likeness;
+      across_side, corner_likeness;
   std::int64_t robust_rounds, quadratic_cells, linear_cells;
 
   template <class F>
   static InkFieldLimits read(const F& f) {
     return {f["place_softening"], f["place_reach2"],    f["residual_scale"], f["least_share"],
-            f["least_scatter"], f["bright"], f["towards_corner"], f["corner_likeness"], f["robust_rounds"],   f["quadratic_cells"], f["linear_cells"]};
+            f["least_scatter"], f["bright"], f["towards_corner"], f["across_side"], f["corner_likeness"], f["robust_rounds"],   f["quadratic_cells"], f["linear_cells"]};
   }
 };
 
