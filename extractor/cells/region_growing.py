@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import cells as native
-from extractor._native import image as native_image
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 
@@ -54,5 +54,6 @@ def grow(view: PyramidLevel, cells: Cells) -> Regions:
     height, width = view.image.shape[:2]
     seed = np.clip(np.rint(view.to_level(cells.center_px)), 0, (width - 1, height - 1)).astype(np.int32)
     limit_px = np.maximum(MAX_GROWN_AREA * cells.area_px / view.scale**2, 1).astype(np.int64)
-    framed, moments = native.grow(native_image.to_hsv(view.image), seed, limit_px, LIMITS)
+    hsv = cv2.cvtColor(view.image, cv2.COLOR_BGR2HSV)
+    framed, moments = native.grow(hsv, seed, limit_px, LIMITS)
     return Regions(region_map=framed[1:-1, 1:-1], seed=seed, moments=moments)

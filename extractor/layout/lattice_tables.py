@@ -128,12 +128,6 @@ class Lattice:
         )
 
     @cached_property
-    def white_cell_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(2,) the center of the white cell, mm, and (2, 2) the layout vectors of one axial step in q and r, mm."""
-        below, left, right = self.marker_mm[:3]
-        return (below + left + right) / 3, np.stack([right - left, right - below], axis=1)
-
-    @cached_property
     def first_ring(self) -> NDArray[np.int32]:
         """(M, 6) int32, the six markers around each marker, -1 outside the pattern."""
         return np.ascontiguousarray(self.neighbours[:, FIRST_RING])

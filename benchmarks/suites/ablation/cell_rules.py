@@ -10,8 +10,16 @@ PIPELINE = (
         "cells are looked for with more effort where some are missing",
         "accuracy",
         "extractor/pipeline.py",
-        "if best is not None and self._is_whole(found):",
-        "if best is not None:",
+        "if self._is_whole(looks[-1]) or (before and looks[-1].count < MIN_GAIN * before.count):",
+        "if True:",
+    ),
+    Rule(
+        "last look",
+        "a look that gains little is the last one",
+        "errors and time",
+        "extractor/pipeline.py",
+        "MIN_GAIN = 1.1  #",
+        "MIN_GAIN = 0.0  #",
     ),
     Rule(
         "growing",
@@ -26,8 +34,8 @@ PIPELINE = (
         "small cells are read at a finer scale",
         "accuracy",
         "extractor/pipeline.py",
-        "if found.is_small(view):",
-        "if False:",
+        "return [one for one in looks if not one.is_small(view)]",
+        "return looks",
     ),
 )
 
@@ -45,7 +53,7 @@ CELLS = (
         "cells are sought at several levels of the contrast",
         "accuracy",
         "extractor/cells/cells.py",
-        "[0.32, 0.5, 0.65])),\n    Effort(7, np.array([0.15, 0.22, 0.42, 0.58, 0.72, 0.85]))",
+        "[0.32, 0.5, 0.65])),\n    Effort(7, np.array([0.2, 0.42, 0.75]))",
         "[0.5])),\n    Effort(7, np.array([0.5]))",
     ),
     Rule(

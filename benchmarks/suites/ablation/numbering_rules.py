@@ -121,14 +121,6 @@ REGISTRATION = (
         "if False:",
     ),
     Rule(
-        "white as good as cells",
-        "a white triangle is as good a triangle as the cells are",
-        "no wrong id",
-        "extractor/numbering/registration.py",
-        "min_quality: float = 0.5",
-        "min_quality: float = -np.inf",
-    ),
-    Rule(
         "most cells numbered",
         "a motion that leaves most cells without a place is compared with all",
         "no wrong id",

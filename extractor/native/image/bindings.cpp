@@ -1,14 +1,12 @@
 // Room "image" for Python.
 #include "base/binding.hpp"
 
-#include "image/color.hpp"
 #include "image/input.hpp"
 #include "image/pyramid.hpp"
 
 namespace cmp::image {
 
 void add_image(nb::module_ module) {
-  bind<&to_hsv>(module, "to_hsv", {"image"});
   bind<&estimate_noise>(module, "estimate_noise", {"image", "xy", "cells", "limits"});
   bind<&block_means>(module, "block_means", {"image", "scale", "light_steps", "value_of_steps"});
 }
