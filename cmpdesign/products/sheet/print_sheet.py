@@ -36,6 +36,9 @@ CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 0.5, 0.1
 # Sine of the least turn of a corner with crop marks: 30 to 150 degrees.
 SHARP = 0.5 - 1e-9
 PATCH_MM, FRAME_MM = 6.0, 0.2
+PATCH_STEP_MM = 9.0, 14.0  # from patch to patch: smallest, for the text below, and usual
+# Height of letters, and width of the mean letter of Helvetica in units of it.
+TEXT_MM, EM_PER_LETTER = 2.6, 0.56
 Points = NDArray[np.float64]
 
 
@@ -111,7 +114,7 @@ def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
             [mark for place in places for mark in _fiducial_polygons(layout, place, design)], INK, "crop"
         )
     )
-    items += _key_items(layout, height, print_side(design).text)
+    items += _key_items(layout, width, height, print_side(design).text)
     items += _color_patch_items(layout, width, height)
     if design.sheet.ruler:
         items += ruler_items(MARGIN_MM + KEY_LEFT_MM, height - MARGIN_MM - KEY_BOTTOM_MM, width - MARGIN_MM)
@@ -228,8 +231,10 @@ def _hairline_polygon(start: Points, direction: Points) -> Points:
     return np.array([start - half, end - half, end + half, start + half])
 
 
-def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPolygons | TextLine]:
-    """QR code, scale bars and text, in the lower left corner."""
+def _key_items(
+    layout: Layout, width: float, height: float, side_text: str
+) -> list[FilledPolygons | TextLine]:
+    """QR code, scale bars and text, in the lower left corner; the text stands above the color patches."""
     with extra("print"):
         import segno
 
@@ -258,24 +263,33 @@ def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPoly
         if layout.code is None
         else f"code {layout.code.id}, digest {layout.digest[:32]}",
         f"{layout.digest[32:]}",
-        f"print at 100 %, not fitted to the page; {side_text}",
+        "print at 100 %, not fitted to the page",
+        side_text,
     )
     items: list[FilledPolygons | TextLine] = [
         FilledPolygons(modules, INK, "code"),
         FilledPolygons([x_bar, y_bar], INK, "scale"),
     ]
-    items += [TextLine(line, text_x, top + 3 + 3.4 * n, 2.6) for n, line in enumerate(lines)]
+    longest_em = EM_PER_LETTER * max(map(len, lines))
+    size = min(TEXT_MM, (width - MARGIN_MM - text_x) / longest_em)
+    items += [TextLine(line, text_x, top - 5.6 + 3.2 * n, size) for n, line in enumerate(lines)]
     items.append(TextLine(f"{BAR_MM:g} mm", text_x, top + X_BAR[0][1] + 4, 2.6))
     items.append(TextLine(f"{BAR_MM:g} mm", left + Y_BAR[0][0] - 2, top + Y_BAR[0][1], 2.6, turned=True))
     return items
 
 
 def _color_patch_items(layout: Layout, width: float, height: float) -> list[FilledPolygons | TextLine]:
-    """One patch per color with the color's name and value, in the lower right corner."""
+    """One patch per color with the color's name and value, in the lower right corner; none where the page has no room
+    beside the scale bar.
+    """
     names = [name for number, name in enumerate(COLORS) if (layout.cell_color == number).any()]
     items: list[FilledPolygons | TextLine] = []
+    room_mm = width - 2 * MARGIN_MM - X_BAR[1][0] - 2
+    step_mm = min(PATCH_STEP_MM[1], room_mm / len(names))
+    if step_mm < PATCH_STEP_MM[0]:
+        return items
     for number, name in enumerate(names):
-        x = width - MARGIN_MM - (len(names) - number) * (PATCH_MM + 8)
+        x = width - MARGIN_MM - (len(names) - number) * step_mm
         y = height - MARGIN_MM - PATCH_MM - 6
         frame = rectangle_points(x - FRAME_MM, y - FRAME_MM, PATCH_MM + 2 * FRAME_MM, PATCH_MM + 2 * FRAME_MM)
         items += [

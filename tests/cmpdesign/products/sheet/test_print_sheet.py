@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from shapely import Polygon, box, unary_union
 from typer.testing import CliRunner
 
 from cmpdesign import build_layout, load
@@ -19,7 +20,8 @@ from cmpdesign.errors import DesignError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.files.resolution import resolution_dpi
 from cmpdesign.products.sheet.key import SheetKey, parse_key
-from cmpdesign.products.sheet.print_sheet import make_print_sheet
+from cmpdesign.products.sheet.page import FilledPolygons, TextLine
+from cmpdesign.products.sheet.print_sheet import make_print_page, make_print_sheet
 from cmpdesign.products.sheet.scan import SheetBars, SheetReading, find_sheet_bars, measure_sheet
 from cmpdesign.products.sheet.verdict import PERSPECTIVE_TOLERANCE_MM
 
@@ -114,6 +116,32 @@ def test_what_cannot_be_read_says_why(scan: Pixels) -> None:
     height = covered.shape[0]
     covered[: int(height - 34 / 25.4 * DPI)] = 255
     assert "a scale bar" in str(find_sheet_bars(covered))
+
+
+@pytest.mark.parametrize("size", ["a3", "a4", "a5", "130x190mm"])
+def test_no_text_lies_on_another_mark_or_beside_the_page(size: str) -> None:
+    """Widths by the metrics of the PDF's face."""
+    from reportlab.pdfbase.pdfmetrics import stringWidth
+
+    parameters = design(
+        **{"sheet.page": size, "mirrored": "true", "print_mirror": "true", "sheet.ruler": "true"}
+    )
+    page, _ = make_print_page(parameters, build_layout(parameters))
+    texts = [
+        box(
+            one.x_mm,
+            one.y_mm - 0.7 * one.size_mm,
+            one.x_mm + stringWidth(one.text, "Helvetica", one.size_mm),
+            one.y_mm,
+        )
+        for one in page.items
+        if isinstance(one, TextLine) and not one.turned
+    ]
+    drawn = [one for one in page.items if isinstance(one, FilledPolygons) and one.name != "paper"]
+    shapes = [Polygon(ring) for one in drawn for ring in one.polygons]
+    assert len(texts) >= 8 and unary_union(texts).within(box(0, 0, page.width_mm, page.height_mm))
+    assert not [shape for shape in shapes if unary_union(texts).intersects(shape)]
+    assert sum(map(lambda one: one.area, texts)) == pytest.approx(unary_union(texts).area)
 
 
 def test_keys_survive_odd_names() -> None:
