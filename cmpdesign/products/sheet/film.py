@@ -37,13 +37,13 @@ def film_pages(design: Design, layout: Layout) -> list[Page]:
     width, height = (side_mm + 2 * edge for side_mm in layout.size_mm)
     place = np.array([edge, edge])
     bleed = page_from_layout(bleed_outline(layout, option), layout, place, design)
+    layers: list[list[FilledPolygons | TextLine]] = [pad_items(layout, place, design)]
+    texts = [f"inks. {side.text}"]
     if side.film == "clear":
         # On a transfer sheet the order of layers turns over.
         order = "under the inks, so print it first" if design.print_mirror else "over the inks"
-        texts = [f"1 of 2: inks. {side.text}", f"2 of 2: full white where this page is black, {order}"]
-        layers = [pad_items(layout, place, design), [FilledPolygons([bleed], INK, "white")]]
-    else:
-        texts, layers = [f"inks. {side.text}"], [pad_items(layout, place, design)]
+        texts = [f"1 of 2: {texts[0]}", f"2 of 2: full white where this page is black, {order}"]
+        layers.append([FilledPolygons([bleed], INK, "white")])
     crop = crop_mark_polygons(layout, place, design)
     across, along = register_marks(width, height)
     marks = [
