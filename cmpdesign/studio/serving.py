@@ -51,7 +51,7 @@ def serve(
         access_log=False,
         server_header=False,
         ws_max_size=MOST_MESSAGE_BYTES,
-        timeout_graceful_shutdown=1,
+        timeout_graceful_shutdown=3,
     )
     announce(door.address)
     if with_browser:
