@@ -37,7 +37,7 @@ ROOMS = {
     ),
     "extractor": (
         "errors frozen_record quality result presets numeric layout image cells localmap numbering refine complete"
-        " pipeline made track space contact draw"
+        " pipeline made contact track space draw"
     ),
 }
 NOT_DESCRIBED = {"extractor", "cmpdesign"}
