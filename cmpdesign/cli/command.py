@@ -28,7 +28,7 @@ from cmpdesign.libraries import missing_library_text
 INTERRUPTED = "interrupted; every file that was written is complete"
 # The commands by what people do, in the order of the help text and of the reference.
 PURPOSES = {
-    "Design and make": "templates init size check build kerf",
+    "Design and make": "templates init studio size check build kerf",
     "Read and follow": "verify track reconstruct calibrate",
     "Try before making": "render evaluate",
     "Make data sets": "dataset extract export",

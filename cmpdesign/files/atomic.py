@@ -126,9 +126,10 @@ def staged_file(path: str | Path) -> Iterator[Path]:
     An error within the block leaves the file at ``path`` unchanged, and no other file.
 
     Raises:
-        OSError: the file cannot be written.
+        OSError: the file cannot be written; its folder is missing.
     """
     path = Path(path)
+    path.parent.stat()
     _require_no_folder(path)
     with Stage(path.parent) as stage:
         staged = stage.folder / f"staged{path.suffix}"
@@ -143,8 +144,12 @@ def write_file(path: str | Path, content: str | bytes) -> None:
         OutputError: the file cannot be written; an earlier file is unchanged.
     """
     path = Path(path)
-    with _as_output_error(path), staged_file(path) as staged:
-        staged.write_bytes(_to_bytes(content))
+    with _as_output_error(path):
+        _require_no_folder(path)
+        with Stage(path.parent) as stage:
+            staged = stage.folder / "staged"
+            staged.write_bytes(_to_bytes(content))
+            stage.commit(staged, path)
 
 
 def write_new_file(path: str | Path, content: str | bytes) -> bool:
