@@ -1,7 +1,7 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
-Stages: image, seeds, grow, mesh, light, walk, number, triangles, place, refine, repair, virtual, quality. A warm start of
-the tracker goes from image over predict and prove to refine.
+Stages: image, seeds, grow, mesh, light, walk, number, triangles, place, refine, repair, virtual, quality. A warm
+start of the tracker goes from image over predict and prove to refine.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is t
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
 EQUILATERAL_AREA = math.sqrt(3.0) / 4.0  # over the square of the side
 MAX_HOLE_SHARE = 0.02  # of a lattice that is not looked at more closely; chosen
-MIN_GAIN = 1.1  # in linked cells, of a look after which cells are looked for even more closely; chosen, for time
+MIN_GAIN = 1.1  # in linked cells, of a look that is followed by a closer one; chosen, for time
 MIN_HOLES = 5  # the same as a number: the white cell may hide its three neighbours. Chosen
 
 Result = TypeVar("Result")
@@ -69,7 +69,7 @@ class FoundCells(NamedTuple):
     walk: Walk
 
     @property
-    def count(self) -> int:
+    def linked(self) -> int:
         """The number of linked cells."""
         return int(np.count_nonzero(self.walk.part >= 0))
 
@@ -97,7 +97,11 @@ class Unnumbered(NamedTuple):
     def weight(self) -> tuple[bool, bool, int]:
         """What orders reasons: that of a pattern first, then a second white cell, then that of most cells."""
         reason = self.refusal.reason
-        return reason != Reason.NO_PATTERN, reason == Reason.SEVERAL_PADS, self.found.count if self.found else 0
+        return (
+            reason != Reason.NO_PATTERN,
+            reason == Reason.SEVERAL_PADS,
+            self.found.linked if self.found else 0,
+        )
 
     @property
     def edge_px(self) -> float:
@@ -149,7 +153,6 @@ class Stages:
         self.results[name] = result
         self._last = now
         return result
-
 
     def keep(self, found: FoundCells) -> None:
         """Keep the results of the look that was numbered, not of the last one."""
@@ -244,7 +247,9 @@ class Extractor:
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (cells, mesh, _, _), numbering = found
         expected = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
-        triangles = stages.record("triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px)))
+        triangles = stages.record(
+            "triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px))
+        )
         places = stages.record("place", merge_corners(triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
@@ -316,7 +321,7 @@ class Extractor:
         before: FoundCells | None = None
         for effort in EFFORTS:
             found = self._find_cells(view, before.cells if before else None, effort, stages)
-            gains = before is None or found.count >= MIN_GAIN * before.count
+            gains = before is None or found.linked >= MIN_GAIN * before.linked
             before = found
             if found.is_small(view):
                 continue
@@ -344,8 +349,8 @@ class Extractor:
 
     def _is_whole(self, found: FoundCells) -> bool:
         """Whether the cells of an image are all found, as far as the cells themselves show it."""
-        return found.count >= self._registration.min_cells and count_holes(found.walk) <= max(
-            MAX_HOLE_SHARE * found.count, MIN_HOLES
+        return found.linked >= self._registration.min_cells and count_holes(found.walk) <= max(
+            MAX_HOLE_SHARE * found.linked, MIN_HOLES
         )
 
 

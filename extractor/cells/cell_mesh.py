@@ -1,7 +1,7 @@
 """Stage 6: the cell mesh links the cells that share a corner, by the cells' triangles alone (eqs. 4 and 5).
 
-A link is mutual: each of two cells has a corner that is the nearest to a corner of the other. Their shapes may differ; the
-directions to each other need only agree roughly with their own triangles. No color decides.
+A link is mutual: each of two cells has a corner that is the nearest to a corner of the other. Their shapes may
+differ; the directions to each other need only agree roughly with their own triangles. No color decides.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ class CellMeshLimits(NamedTuple):
     """Limits of the mesh.
 
     Attributes:
-        first_tolerance: L of eq. 5, in edges of the smaller cell, between two corners while the swelling is unknown; the
-            next corner is an edge away. Chosen.
+        first_tolerance: L of eq. 5, in edges of the smaller cell, between two corners while the swelling is unknown;
+            the next corner is an edge away. Chosen.
         tolerance: the same with the swelling. Chosen.
         direction_tolerance: in edges, between a neighbour's center and where a cell's own triangle expects it. Chosen.
         min_swelling, max_swelling: of a whole image. Chosen.
@@ -67,7 +67,7 @@ class CellMesh:
     @property
     def is_linked(self) -> NDArray[np.bool_]:
         """(N,) bool, the cells with a link."""
-        return (self.links.neighbours >= 0).any(axis=1)
+        return np.asarray((self.links.neighbours >= 0).any(axis=1))
 
 
 def build_cell_mesh(cells: Cells) -> CellMesh:

@@ -134,8 +134,19 @@ def find_cells(
     known = (np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3, 2)), np.zeros(0), np.zeros(0))
     if before is not None:
         corners = view.to_level(before.corner_px)
-        known = (view.to_level(before.center_px), before.area_px / scale**2, corners, before.quality, before.share)
+        known = (
+            view.to_level(before.center_px),
+            before.area_px / scale**2,
+            corners,
+            before.quality,
+            before.share,
+        )
     center, area, corner, quality, share = native.find_candidates(
-        np.ascontiguousarray(view.image), 0, effort.maps, effort.shares, *known, LIMITS._replace(tile_px=tile_px)
+        np.ascontiguousarray(view.image),
+        0,
+        effort.maps,
+        effort.shares,
+        *known,
+        LIMITS._replace(tile_px=tile_px),
     )
     return Cells(view.to_full_scale(center), area * scale**2, view.to_full_scale(corner), quality, share)

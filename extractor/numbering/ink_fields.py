@@ -1,8 +1,8 @@
 """Inks by the lattice: the colors of the three classes (q - r) mod 3 are smooth fields over a part.
 
-Open is only which field is which ink: the naming. It is decided once an image by the fields' shares of the light in each
-channel, compared with the palette's. A hue is not asked for: colored light may move all hues, and order the fields all the
-same.
+Open is only which field is which ink: the naming. It is decided once an image by the fields' shares of the light in
+each channel, compared with the palette's. A hue is not asked for: colored light may move all hues, and order the
+fields all the same.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ class InkFieldLimits(NamedTuple):
         least_share: of the strongest field, the least of another one, to take its logarithm. Chosen.
         least_scatter: of a field's light, the least scatter of cells. Chosen.
         bright: whiteness of a down-cell that is not black. Chosen.
-        towards_corner: share of the way from its center to its corners, up to which a white cell is white. Chosen: beyond
-            it is blurred.
-        across_side: share of the way from its center to those of the cells beside it, from which on these are not white.
+        towards_corner: share of the way from its center to its corners, up to which a white cell is white. Chosen:
+            beyond it is blurred.
+        across_side: share of the way from its center to those of the cells beside it, from which on these are not
+            white.
             Chosen: the side lies at a half.
         corner_likeness: of the light of the center, the largest difference there. Chosen.
         likeness: of a field's light, the largest difference of a cell that is like it. Chosen.
@@ -75,8 +76,8 @@ class InkFields:
         down_axial: (D, 2) int32, the part's down-cells: the black ones and the white one.
         whiteness: (D,) float64, their light over the black around, relative to the strongest inks there; NaN outside
             the image.
-        is_triangle: (D,) bool, the bright ones of which the light fills the triangle, and no cell beside it; a drop, glare
-            or a scratch hardly ever ends at the sides of a cell.
+        is_triangle: (D,) bool, the bright ones of which the light fills the triangle, and no cell beside it; a drop,
+            glare or a scratch hardly ever ends at the sides of a cell.
         fit: the share of the part's cells whose color is like that of their class's field.
     """
 
@@ -119,9 +120,12 @@ class Palette:
         )
 
     def other_side_reason(self, shares: NDArray[np.float64]) -> Reason:
-        """Why the inks are in the order of another side than stated: a mirrored view has the palette's shares as they are,
-        an image with swapped channels has them swapped."""
-        as_is, swapped = self._misfit(shares, other_side=True), self._misfit(shares[:, ::-1], other_side=False)
+        """Why the inks are in the order of another side than stated: a mirrored view has the palette's shares as they
+        are, an image with swapped channels has them swapped."""
+        as_is, swapped = (
+            self._misfit(shares, other_side=True),
+            self._misfit(shares[:, ::-1], other_side=False),
+        )
         if min(as_is, swapped) > MAX_MISFIT_RATIO * max(as_is, swapped):
             return Reason.OTHER_SIDE
         return Reason.MIRRORED if as_is < swapped else Reason.SWAPPED_CHANNELS

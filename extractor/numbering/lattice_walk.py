@@ -1,7 +1,7 @@
 """Stage 7, the spin-search algorithm (SSA): walks from cell to cell around their common corners (eqs. 4 and 5).
 
-The best links are followed first. A walk gives every connected part axial coordinates in a frame of its own, by geometry
-alone. Cells at links that contradict the walk are left out, and the walk is done again without them.
+The best links are followed first. A walk gives every connected part axial coordinates in a frame of its own, by
+geometry alone. Cells at links that contradict the walk are left out, and the walk is done again without them.
 """
 
 from __future__ import annotations
@@ -133,7 +133,12 @@ def count_holes(walk: Walk) -> int:
         here[q, r] = 1
         inner = here[1:-1, 1:-1]
         around = (
-            here[2:, 1:-1] + here[:-2, 1:-1] + here[1:-1, 2:] + here[1:-1, :-2] + here[2:, :-2] + here[:-2, 2:]
+            here[2:, 1:-1]
+            + here[:-2, 1:-1]
+            + here[1:-1, 2:]
+            + here[1:-1, :-2]
+            + here[2:, :-2]
+            + here[:-2, 2:]
         )
         holes += int(np.count_nonzero((inner == 0) & (around >= MIN_HOLE_NEIGHBOURS)))
     return holes

@@ -17,8 +17,8 @@ class MissingCellLimits(NamedTuple):
 
     Attributes:
         prior: of the map through the cells around.
-        min_neighbours: numbered cells that share a corner with a predicted one; with those around them they determine a map.
-            Chosen.
+        min_neighbours: numbered cells that share a corner with a predicted one; with those around them they determine
+            a map. Chosen.
     """
 
     prior: MapPrior = ATTACHMENT.prior

@@ -229,7 +229,7 @@ class _Placed(NamedTuple):
     @property
     def is_own(self) -> NDArray[np.bool_]:
         """(N,) bool, the part's cells."""
-        return self.seen.cells.part == self.seen.part
+        return np.asarray(self.seen.cells.part == self.seen.part)
 
     @property
     def tied(self) -> NDArray[np.intp]:
@@ -283,7 +283,11 @@ class Registration:
             numbering = self._number_with(one, placed)
             if numbering is not None:
                 return numbering
-        return found[0] if isinstance(found[0], Refusal) else Refusal(_uncertain_reason(found[0]), found[0].seen.fields)
+        return (
+            found[0]
+            if isinstance(found[0], Refusal)
+            else Refusal(_uncertain_reason(found[0]), found[0].seen.fields)
+        )
 
     def _see(self, image: _WalkedImage, part: int) -> _Seen | Refusal:
         """The colors of a part, or the reason why its side is refused."""
@@ -306,7 +310,11 @@ class Registration:
             return Refusal(reason, fields)
         naming = NAMING_WEIGHT * (own - own.max())
         # where all classes look alike it is the tiling of another pattern, or the light shows no ink
-        return _Seen(part, walked, fields, mirrored, naming) if naming.min() < -LEAD else Refusal(Reason.NO_PATTERN, fields)
+        return (
+            _Seen(part, walked, fields, mirrored, naming)
+            if naming.min() < -LEAD
+            else Refusal(Reason.NO_PATTERN, fields)
+        )
 
     def _register(self, seen: _Seen, bright: BrightPlaces) -> _Placed:
         """A part with its motions."""
@@ -347,11 +355,14 @@ class Registration:
         counts = np.array([np.count_nonzero(self._placed_cells(placed, k, parts) >= 0) for k in range(count)])
         score = placed.motions.score[:count] + WITNESSES.outside_weight * counts
         order = np.argsort(-score, kind="stable")
-        chosen = Motions(*(values[order] for values in placed.motions))._replace(score=score[order])
+        motions = placed.motions
+        chosen = Motions(motions.motion[order], score[order], motions.inside[order], motions.white[order])
         decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
         return [decided] if decided.lead >= JOINT_LEAD else []
 
-    def _placed_cells(self, placed: _Placed, number: int, limits: AttachmentLimits = ATTACHMENT) -> NDArray[np.int32]:
+    def _placed_cells(
+        self, placed: _Placed, number: int, limits: AttachmentLimits = ATTACHMENT
+    ) -> NDArray[np.int32]:
         """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
         seen = placed.seen
         own = seen.cells.part == seen.part
@@ -366,7 +377,8 @@ class Registration:
         return np.where(odd, -1, cell).astype(np.int32)
 
     def _number_with(self, placed: _Placed, parts: list[_Placed]) -> Numbering | Refusal | None:
-        """The numbers of all cells by the part whose motion is certain; none if the other parts contradict the motion."""
+        """The numbers of all cells by the part whose motion is certain; none if the other parts contradict the
+        motion."""
         cell = self._placed_cells(placed, 0)
         sizes = np.array([[one.is_own.sum(), (cell[one.is_own] >= 0).sum()] for one in parts])
         count, numbered = sizes.sum(axis=0)
@@ -406,7 +418,8 @@ class BrightPlaces(NamedTuple):
     def of(parts: list[NDArray[np.float64]]) -> BrightPlaces:
         """Of the whiteness (D,) of the down-cells of each part."""
         return BrightPlaces(
-            sum(int(np.isfinite(one).sum()) for one in parts), sum(int((one > LIMITS.bright).sum()) for one in parts)
+            sum(int(np.isfinite(one).sum()) for one in parts),
+            sum(int((one > LIMITS.bright).sum()) for one in parts),
         )
 
     def white_odds(self, fields: InkFields) -> NDArray[np.float64]:
@@ -415,7 +428,11 @@ class BrightPlaces(NamedTuple):
         others = max(self.bright - 1, 0)
         is_bright = np.log(WHITE.white_is_bright * (self.known + 1.0) / (others + WHITE.usual_bright))
         bright, dark = whiteness > LIMITS.bright, whiteness < WHITE.dark
-        is_bright = np.where(fields.is_triangle, is_bright + WHITE.is_triangle, min(float(is_bright), WHITE.max_without_triangle))
+        is_bright = np.where(
+            fields.is_triangle,
+            is_bright + WHITE.is_triangle,
+            min(float(is_bright), WHITE.max_without_triangle),
+        )
         odds = np.where(bright, is_bright, np.where(dark, WHITE.white_is_dark, 0.0))
         return np.where(np.isfinite(whiteness), odds, np.nan)
 
