@@ -10,8 +10,8 @@ PIPELINE = (
         "cells are looked for with more effort where some are missing",
         "accuracy",
         "extractor/pipeline.py",
-        "if self._is_whole(looks[-1]) or (before and looks[-1].count < MIN_GAIN * before.count):",
-        "if True:",
+        "if gains and effort is not EFFORTS[-1] and not self._is_whole(found):",
+        "if False:",
     ),
     Rule(
         "last look",
@@ -34,8 +34,8 @@ PIPELINE = (
         "small cells are read at a finer scale",
         "accuracy",
         "extractor/pipeline.py",
-        "return [one for one in looks if not one.is_small(view)]",
-        "return looks",
+        "if found.is_small(view):",
+        "if False:",
     ),
 )
 

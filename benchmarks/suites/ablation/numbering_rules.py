@@ -109,7 +109,7 @@ REGISTRATION = (
         "all parts together decide between motions of one part",
         "accuracy",
         "extractor/numbering/registration.py",
-        "MAX_TIED = 24",
+        "MAX_TIED = 60",
         "MAX_TIED = 0",
     ),
     Rule(

@@ -157,7 +157,8 @@ Array<double, 2> centers(View<const double, 2> xy, View<const std::int32_t, 2> c
   return out;
 }
 
-// Contrast, the two inks that differ least, clipping and evenness at the middles of cells (K, 2) px; NaN where unknown.
+// Contrast, the two inks that differ least, clipping and evenness at the middles of cells (K, 2) px; NaN
+// where unknown.
 CellFigures measure_cells(const image::PyramidLevel& view, View<const double, 2> center,
                           View<const std::uint8_t, 1> color, double edge_px, const QualityLimits& limits) {
   const auto light = view.response.light;
