@@ -34,7 +34,7 @@ class ShapeLimits(NamedTuple):
         ragged_weight: of the difference between solidity and 1 in the quality of a shape. Chosen.
     """
 
-    max_elongation: float = 16.0
+    max_elongation: float = 13.0
     min_solidity: float = 0.7
     max_solidity: float = 1.25
     ragged_weight: float = 1.5
