@@ -52,7 +52,8 @@ class CellLimits(NamedTuple):
         min_contrast_deviations: least contrast, in standard deviations of the noise. Chosen.
         level_weight: in the quality, of the logarithm of a region's level over half of its contrast, where the true
             outline is. Chosen.
-        tile_px: of the tiles of local levels; a cell and its black neighbours fit into three by three.
+        tile_px: of the tiles of local levels; a cell and its black neighbours fit into three by three. Derived:
+            half of the largest edge.
     """
 
     shape: ShapeLimits = ShapeLimits()
