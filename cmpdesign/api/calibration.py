@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from cmpdesign.api.layouts import reference_from
 from cmpdesign.api.workshop import read_pictures
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.watch import tell
 
@@ -195,6 +195,7 @@ def _read_views(
     """
     from cmpdesign.files.images import read_image
     from extractor import ViewExtractor
+    from extractor.result import SIDE_REASONS
 
     views = ViewExtractor(
         reference, sensor.rig.without_poses(), preset, cast("Any", sensor.table.response), side
@@ -205,7 +206,12 @@ def _read_views(
         markers = views.extract(pictures if len(pictures) > 1 else pictures[0])
         for view, one in zip(sensor.rig.views, markers, strict=True):
             if not one.found:
-                raise CmpDesignError(f"{name}: view {view.name!r} shows no pattern: {one.reason}")
+                hint = (
+                    f"; check which views are mirrored, or state {parameter('side')}"
+                    if one.reason in SIDE_REASONS
+                    else ""
+                )
+                raise CmpDesignError(f"{name}: view {view.name!r} shows no pattern: {one.reason}{hint}")
         out.append(markers)
         tell(number + 1, len(names), unit="pictures")
     return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import date
+import datetime
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
@@ -100,7 +100,7 @@ class ConditionRanges(_StrictTable):
 class CameraCalibration(_StrictTable):
     """What ``calibrate camera`` found."""
 
-    date: date | None = None
+    date: datetime.date | None = None
     model: Line = ""
     pictures: int = 0
     refused: tuple[Line, ...] = ()
@@ -130,7 +130,7 @@ class CameraCalibration(_StrictTable):
 class RigCalibration(_StrictTable):
     """What ``calibrate rig`` found."""
 
-    date: date | None = None
+    date: datetime.date | None = None
     pictures: int = 0
     steps_mm: tuple[float, ...] = ()
     rms_px: tuple[float, ...] = ()

@@ -190,7 +190,7 @@ class View:
         return replace(self, mirrored=None, R_camera_from_layout=rotation, t_camera_from_layout_mm=shift)
 
     def turned(self, step: Any) -> View:
-        """The placed view after a small turn (rad) and shift (mm) of the pattern in ``step`` (6,), see ``Linearisation``."""
+        """The placed view after a turn (rad) and a shift (mm) of the pattern, ``step`` (6,), see ``Linearisation``."""
         turn, _ = cv2.Rodrigues(np.array(step[:3], np.float64))
         left, _, right = np.linalg.svd(np.asarray(turn) @ self.R_camera_from_layout)
         return self.at(left @ right, self.t_camera_from_layout_mm + np.array(step[3:], np.float64))

@@ -77,7 +77,7 @@ MAX_DEVIATIONS = 100
 MAX_NUMBER = 1e9  # of a rig's numbers, px or mm
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Deviation:
     """One standard deviation of a rig of V views from its numbers, independent of the rig's other ones.
 

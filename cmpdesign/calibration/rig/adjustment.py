@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.calibration.rig.unknowns import Unknowns, see
-from extractor import View
+from extractor import RigError, View
 from extractor.space.camera import is_covariance, is_finite
 from extractor.space.triangulation import triangulate
 
@@ -192,27 +192,35 @@ class _Whole:
 
 def _minimise(whole: _Whole, state: _State, scale: float) -> tuple[_State, _Equations]:
     problem, damping = whole.problem, INITIAL_DAMPING
-    known, unknowns = problem.information, problem.unknowns
+    known = problem.information
     now = whole.equations(state)
     for _ in range(ITERATIONS):
         normal = now.normal / scale**2 + known
         right = now.right / scale**2 - known @ state.moved
         step = _inverse(normal + damping * np.diag(normal.diagonal())) @ right
-        count = unknowns.count
-        tried = _State(
-            unknowns.deviation(step[:count]).applied(state.views),
-            state.plate + step[count:],
-            state.moved + step,
-        )
-        tried_now = whole.equations(tried)
-        better = _cost(tried_now, tried, known, scale) <= _cost(now, state, known, scale)
-        if better:
+        tried = _moved(problem.unknowns, state, step)
+        tried_now = None if tried is None else whole.equations(tried)
+        if (
+            tried is not None
+            and tried_now is not None
+            and _cost(tried_now, tried, known, scale) <= _cost(now, state, known, scale)
+        ):
             state, now, damping = tried, tried_now, damping / 10
         else:
             damping *= 10
         if right @ step < CONVERGED**2 or damping > MAX_DAMPING:
             break
     return state, now
+
+
+def _moved(unknowns: Unknowns, state: _State, step: Array) -> _State | None:
+    """The values after a step; None where no rig has them."""
+    count = unknowns.count
+    try:
+        views = unknowns.deviation(step[:count]).applied(state.views)
+    except RigError:
+        return None
+    return _State(views, state.plate + step[count:], state.moved + step)
 
 
 def _cost(found: _Equations, state: _State, known: Array, scale: float) -> float:
