@@ -112,7 +112,6 @@ def calibrate_rig(
     *,
     steps: Mapping[float, str | Path] | None = None,
     step_sigma_mm: float = 0.002,
-    preset: Preset = "accurate",
     side: Side = "designed",
     max_pixels: int = MOST_PIXELS,
 ) -> RigCalibration:
@@ -129,7 +128,7 @@ def calibrate_rig(
         output: sensor file to write, beside ``rig``; None: none.
         steps: ways of a flat plate that presses the pattern, mm -> picture.
         step_sigma_mm: standard deviation of a way.
-        preset, side: see ``extractor.Extractor``.
+        side: see ``extractor.Extractor``.
         max_pixels: largest image that is read, width x height.
 
     Raises:
@@ -147,7 +146,7 @@ def calibrate_rig(
     given = [rest] if isinstance(rest, str | Path) else list(rest)
     ways = dict(steps or {})
     names = [*map(str, given), *map(str, ways.values())]
-    found = _read_views(sensor, reference, names, preset, side, max_pixels)
+    found = _read_views(sensor, reference, names, side, max_pixels)
     camera = sensor.table.calibration.camera
     calibration = calibrate_rig_markers(
         reference,
@@ -181,12 +180,7 @@ def _require_beside(rig: Path, output: Path) -> None:
 
 
 def _read_views(
-    sensor: SensorFile,
-    reference: Reference,
-    names: Sequence[str],
-    preset: Preset,
-    side: Side,
-    max_pixels: int,
+    sensor: SensorFile, reference: Reference, names: Sequence[str], side: Side, max_pixels: int
 ) -> list[tuple[Markers, ...]]:
     """The markers of all pictures, view by view.
 
@@ -198,7 +192,7 @@ def _read_views(
     from extractor.result import SIDE_REASONS
 
     views = ViewExtractor(
-        reference, sensor.rig.without_poses(), preset, cast("Any", sensor.table.response), side
+        reference, sensor.rig.without_poses(), "accurate", cast("Any", sensor.table.response), side
     )
     out = []
     for number, name in enumerate(names):

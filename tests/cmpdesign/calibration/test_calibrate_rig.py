@@ -19,8 +19,7 @@ from cmpdesign.evaluate.simulated.sensor import parse_sensor
 from cmpdesign.scene import Medium as DrawnMedium
 from cmpdesign.scene import Pinhole, render
 from cmpdesign.sensor.sensor_file import load_sensor_file
-from extractor import Reconstructor, Rig, View, ViewExtractor, load_layout
-from extractor.space.medium import Medium
+from extractor import Medium, Reconstructor, Rig, View, ViewExtractor, load_layout
 from tests.support.command import refused, run
 from tests.support.layouts import small_layout
 from tests.support.sensors import small_sensor_text

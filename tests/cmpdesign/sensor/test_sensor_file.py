@@ -14,8 +14,7 @@ import cmpdesign
 from cmpdesign.sensor.sensor_file import load_sensor_file, parse_sensor_file
 from cmpdesign.sensor.tables import SensorError
 from cmpdesign.sensor.toml_text import replaced_tables, toml_table
-from extractor import load_rig
-from extractor.space.rig import Deviation
+from extractor import Deviation, load_rig
 from tests.support.command import refused, run
 from tests.support.hostile.input_files import RIG
 from tests.support.layouts import small_layout

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.options.images import MaxPixelsOption, PresetOption
+from cmpdesign.cli.options.images import MaxPixelsOption
 from cmpdesign.cli.options.paths import require_suffix
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
@@ -56,7 +56,6 @@ def rig(
     step_sigma_mm: Annotated[
         float, typer.Option(metavar="MM", min=1e-6, help="Standard deviation of the way of a step.")
     ] = 0.002,
-    preset: PresetOption = "accurate",
     side: Annotated[
         Side,
         typer.Option(help="Side of the pattern that the camera sees; designed: as stated in the layout."),
@@ -80,7 +79,6 @@ def rig(
             output,
             steps=steps,
             step_sigma_mm=step_sigma_mm,
-            preset=preset,
             side=side,
             max_pixels=max_pixels,
         )
