@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from cmpdesign.calibration.rig.calibration import RigCalibration
 
 EXAMPLES = (
-    "cmpdesign calibrate rig layout.json measured.toml rest.png -o sensor.toml",
-    "cmpdesign calibrate rig layout.json measured.toml rest.png --step 0.5=plate05.png --step 1=plate10.png "
-    "-o sensor.toml",
+    "cmpdesign calibrate rig layout.json measured.toml pad.png -o thumb.toml",
+    "cmpdesign calibrate rig layout.json measured.toml pad.png -o thumb.toml --json",
 )
 LARGEST_SCALE = 3.0  # residuals over their stated deviations, as of a rest frame of reconstruct
 LARGEST_MIRROR_SHIFT_MM = 0.2
