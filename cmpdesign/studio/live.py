@@ -125,6 +125,20 @@ class LiveFeed:
         return thread
 
 
+class NoSink:
+    """The sink of a run that is not recorded."""
+
+    def add(self, frame: Any, image: Any = None) -> None:
+        """Forget the frame."""
+
+    def close(self) -> None:
+        """There is no file."""
+
+    def kept(self) -> str:
+        """There is no file."""
+        return ""
+
+
 class CameraReader:
     """Reads the frames that the browser's camera sends, one after the other."""
 

@@ -15,7 +15,7 @@ td, th { text-align: left; padding: .9mm 2.5mm; border-bottom: .15mm solid #bbb;
 ul { list-style: none; padding: 0 } li { margin: 1.6mm 0; padding-left: 8mm; text-indent: -8mm }
 li::before { content: "\\2610"; display: inline-block; width: 8mm; text-indent: 0; font-size: 13pt; line-height: 1 }
 .warn { border: .5mm solid #b3261e; padding: 2mm 3mm; margin: 3mm 0 } img { max-width: 60mm; margin: 0 3mm 2mm 0 }
-img.whole { max-width: 100%; max-height: 110mm } small { color: #5c5650 }
+img.whole { max-width: 100%; max-height: 60mm } small { color: #5c5650 }
 """
 
 

@@ -43,7 +43,7 @@ def view(
     The page is that of studio, at its live part. The run goes at the camera's rate, whatever the page shows.
     Ctrl-C ends it.
     """
-    from cmpdesign.studio.live import LiveFeed
+    from cmpdesign.studio.live import LiveFeed, NoSink
     from cmpdesign.studio.serving import serve
     from cmpdesign.tracking.jobs.job import write_summary
 
@@ -52,6 +52,9 @@ def view(
     with tempfile.TemporaryDirectory(prefix="cmpdesign-view-") as folder:
         job = _job(layout, source, output or Path(folder) / "run.npz", rest, rig, contact)
         run = job.prepare()
+        if output is None:
+            run.sink.close()
+            run.sink = NoSink()
         feed = LiveFeed(run.source.name, job.layout, is_paced=not run.source.is_live)
         thread = feed.follow(run)
         try:
