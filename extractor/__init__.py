@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from extractor.space.camera import View
     from extractor.space.field import Field
     from extractor.space.medium import Medium, WindowPlane
+    from extractor.space.one_view import ContactTracker
     from extractor.space.reconstruction import Reconstructor, Shape
     from extractor.space.rig import Rig, load_rig, parse_rig
     from extractor.space.triangulation import PointReason, triangulate
@@ -48,6 +49,7 @@ __all__ = [
     "ContactForce",
     "ContactReader",
     "ContactReason",
+    "ContactTracker",
     "Extractor",
     "ExtractorError",
     "Field",
@@ -97,6 +99,7 @@ _HOMES = {
     "ContactForce": "extractor.contact",
     "ContactReader": "extractor.contact",
     "ContactReason": "extractor.contact",
+    "ContactTracker": "extractor.space.one_view",
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
     "ForceModel": "extractor.contact",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from extractor.contact.active_set import Solution, TractionSolver
 from extractor.contact.gel import Gel
-from extractor.contact.regions import Patch, find_patches
+from extractor.contact.regions import AREA_ERROR, Patch, find_patches
 from extractor.contact.result import ContactForce, ContactReason, Region
 from extractor.errors import GelError
 from extractor.layout.layout_file import LayoutLike, layout_of
@@ -99,7 +100,7 @@ class ContactReader:
         self.gel, self.young_mpa, self.friction, self.model = gel, float(young_mpa), friction, model
         self.young_share = float(young_sigma_mpa) / self.young_mpa
         self.about_mm = np.asarray(about_mm, np.float64)
-        self._solver = TractionSolver(gel)
+        self._axes, self._solver = 3, TractionSolver(gel)
         offset = self.layout.xy_mm[:, None] - gel.loads_mm
         self._at_markers = np.exp(-0.5 * (offset**2).sum(axis=2) / gel.width_mm**2)
         offset = gel.loads_mm[:, None] - gel.loads_mm
@@ -110,6 +111,18 @@ class ContactReader:
         self._rim_mm = _distance_inside(gel.outline_mm, gel.loads_mm)
         self._support: NDArray[np.intp] | None = None
 
+    def seen(self, by_displacement: Array) -> ContactReader:
+        """A reader of other measured numbers than displacements in space, for example of those in one image.
+
+        Args:
+            by_displacement: (M, C, 3) derivatives of a marker's C measured numbers by its displacement in mm.
+        """
+        other = copy(self)
+        other._axes = by_displacement.shape[1]
+        other._solver = TractionSolver(self.gel, by_displacement)
+        other.reset()
+        return other
+
     def reset(self) -> None:
         """Forget the frame before."""
         self._support = None
@@ -118,35 +131,35 @@ class ContactReader:
         """The contact of a reconstructed surface."""
         return self.read(shape.displacement_mm, shape.displacement_cov_mm2)
 
-    def read(self, displacement_mm: Array, cov_mm2: Array) -> ContactForce:
+    def read(self, displacement: Array, cov: Array) -> ContactForce:
         """The contact from displacements (M, 3) mm with covariances (M, 3, 3) mm^2; NaN where unknown.
+
+        A reader made by ``seen`` reads C numbers a marker in their own units.
 
         Raises:
             ValueError: another shape, or displacements without covariances.
         """
-        count = len(self.layout.xy_mm)
-        if np.shape(displacement_mm) != (count, 3) or np.shape(cov_mm2) != (count, 3, 3):
+        count, axes = len(self.layout.xy_mm), self._axes
+        if np.shape(displacement) != (count, axes) or np.shape(cov) != (count, axes, axes):
             raise ValueError(
-                f"displacement_mm {np.shape(displacement_mm)} and cov_mm2 {np.shape(cov_mm2)}; expected "
-                f"({count}, 3) and ({count}, 3, 3): one displacement and its covariance for every marker"
+                f"displacement {np.shape(displacement)} and cov {np.shape(cov)}; expected ({count}, {axes}) and "
+                f"({count}, {axes}, {axes}): one displacement and its covariance for every marker"
             )
         known = np.asarray(
-            np.isfinite(displacement_mm).all(axis=1) & np.isfinite(cov_mm2).all(axis=(1, 2)), np.bool_
+            np.isfinite(displacement).all(axis=1) & np.isfinite(cov).all(axis=(1, 2)), np.bool_
         )
         present = max(int(self.layout.present.sum()), 1)
         if known.sum() < self.model.fewest_known * present:
             self._support = None
             return self._without(ContactReason.TOO_FEW_MARKERS, np.nan)
-        whitening = np.zeros((count, 3, 3))
+        whitening = np.zeros((count, axes, axes))
         try:
-            whitening[known] = np.linalg.inv(np.linalg.cholesky(np.asarray(cov_mm2)[known]))
+            whitening[known] = np.linalg.inv(np.linalg.cholesky(np.asarray(cov)[known]))
         except np.linalg.LinAlgError:
             raise ValueError(
-                "cov_mm2 has a matrix that is not positive definite; give the noise's covariance"
+                "cov has a matrix that is not positive definite; give the noise's covariance"
             ) from None
-        solution = self._solver.solve(
-            np.where(known[:, None], displacement_mm, 0.0), whitening, self._support
-        )
+        solution = self._solver.solve(np.where(known[:, None], displacement, 0.0), whitening, self._support)
         self._support = None if solution is None else solution.support
         return (
             self._without(ContactReason.NOTHING_TOUCHED, 0.0) if solution is None else self._answer(solution)
@@ -164,7 +177,7 @@ class ContactReader:
         force = self.young_mpa * solution.traction * gel.area_mm2[support, None]
         traction = np.zeros((len(gel.loads_mm), 3))
         traction[support] = self.young_mpa * solution.traction
-        patches = find_patches(gel, self._smooth @ -traction[:, 2], support)
+        patches = find_patches(gel, self._smooth @ -traction[:, 2], support, -force[:, 2])
         for patch in patches:
             mine = patch.members
             load = -force[mine, 2].sum() / (patch.area_mm2 * self.young_mpa)
@@ -232,7 +245,7 @@ class ContactReader:
         by_load = (at - centre) * (self.gel.area_mm2[support[patch.members]] / press.sum())[:, None]
         cov = by_load.T @ noise[np.ix_(rows, rows)] @ by_load + self.model.centre_error_mm**2 * np.eye(2)
         return Region(
-            patch.area_mm2, patch.outline_mm, centre, cov,
+            patch.area_mm2, AREA_ERROR * patch.area_mm2, patch.outline_mm, centre, cov,
             whole.force, whole.force_cov, whole.torque, whole.torque_cov,
         )  # fmt: skip
 

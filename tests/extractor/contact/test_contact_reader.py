@@ -21,6 +21,7 @@ from extractor import (
     Gel,
     GelError,
     Reference,
+    View,
     load_gel,
 )
 
@@ -135,6 +136,29 @@ def test_a_tenth_of_the_markers_may_be_lost(layout: Reference, gel: Gel) -> None
     assert np.isfinite(found.force_cov_n2).all()
     assert len(found.regions) == 1
     np.testing.assert_allclose(found.force_n, press.force_n, atol=0.05 * np.linalg.norm(press.force_n))
+
+
+def test_one_view_gives_the_force_through_its_projection(layout: Reference, gel: Gel) -> None:
+    """A camera 60 mm below the pad, 14 px a mm."""
+    view = View(
+        "below",
+        (840.0, 840.0),
+        (320.0, 240.0),
+        R_camera_from_layout=np.eye(3),
+        t_camera_from_layout_mm=(0, 0, 60.0),
+    )
+    flat = np.pad(layout.xy_mm, [(0, 0), (0, 1)])
+    press = Press(gel, (0.5, -0.5, 2.5), shear=0.2)
+    random = np.random.default_rng(2)
+    moved_px = (
+        view.project(flat + press.moved) - view.project(flat) + 0.02 * random.normal(size=(len(flat), 2))
+    )
+    reader = ContactReader(layout, gel, YOUNG_MPA, model=LINEAR).seen(view.linearised(flat).by_point)
+    found = reader.read(moved_px, np.tile(0.02**2 * np.eye(2), (len(flat), 1, 1)))
+    np.testing.assert_allclose(found.force_n, press.force_n, atol=0.05 * np.linalg.norm(press.force_n))
+    assert len(found.regions) == 1
+    with pytest.raises(ValueError, match="2, 2"):
+        reader.read(press.moved, cov(layout))
 
 
 def test_a_warm_frame_finds_the_force_of_a_cold_one(layout: Reference, gel: Gel) -> None:
