@@ -79,6 +79,7 @@ class TrackStatistics:
         self._qualities: list[Quality] = []
         self._resting: Tracked | None = None
         self._pairs, self._squares, self._values = 0, 0.0, 0
+        self._contacts = ContactStatistics()
         self._largest = _LargestDisplacement()
         self._farthest_px = -1.0
         self.farthest: Tracked | None = None

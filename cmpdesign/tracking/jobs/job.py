@@ -110,13 +110,14 @@ class TrackJob:
         at_rest, rest = None, how["rest"]
         if rest is not None:
             at_rest = read_rest_markers(str(rest), source, how["fps"], new_tracker(), how["max_pixels"])
-        tracker: Tracker | ContactTracker = new_tracker(rest=at_rest, mm_per_px=how["mm_per_px"])
+        plain = new_tracker(rest=at_rest, mm_per_px=how["mm_per_px"])
+        tracker: Tracker | ContactTracker = plain
         contact, gel, rig = None, _path(how["contact"]), _path(how["rig"])
         if (gel is None) != (rig is None):
             raise CmpDesignError(f"{parameter('contact')} and {parameter('rig')} need each other; give both")
         if gel is not None and rig is not None:
             contact = _contact_reader(gel, rig, self.layout)
-            tracker = _contact_tracker(tracker, rig, contact, at_rest)
+            tracker = _contact_tracker(plain, rig, contact, at_rest)
         frames = open_source(source, how["fps"], how["max_pixels"], how["times"])
         video = None
         if self.overlay is not None:
