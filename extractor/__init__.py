@@ -37,11 +37,10 @@ if TYPE_CHECKING:
     from extractor.space.camera import View
     from extractor.space.field import Field
     from extractor.space.medium import Medium, WindowPlane
-    from extractor.space.one_view import ContactTracker
     from extractor.space.reconstruction import Reconstructor, Shape
     from extractor.space.rig import Rig, load_rig, parse_rig
     from extractor.space.triangulation import PointReason, triangulate
-    from extractor.space.views import ShapeFrame, ShapeTracker, ViewExtractor
+    from extractor.space.views import ContactTracker, ShapeFrame, ShapeTracker, ViewExtractor
     from extractor.track.displacement import Rest
     from extractor.track.tracker import FrameStatus, StartKind, Tracked, Tracker
 
@@ -99,7 +98,7 @@ _HOMES = {
     "ContactForce": "extractor.contact",
     "ContactReader": "extractor.contact",
     "ContactReason": "extractor.contact",
-    "ContactTracker": "extractor.space.one_view",
+    "ContactTracker": "extractor.space.views",
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
     "ForceModel": "extractor.contact",

@@ -130,7 +130,7 @@ def main() -> int:
                     f"{-read[0].force_n[2] / (area * 0.3):.3f}", f"{np.sqrt(area / np.pi) / thickness:.2f}",
                     f"{read[1].force_n[2] / read[0].force_n[2]:.4f}",
                 )  # fmt: skip
-    wide_console().print(table)
+    wide_console(150).print(table)
     return 0
 
 

@@ -20,7 +20,7 @@ from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 if TYPE_CHECKING:
     from extractor.contact import ContactReader
-    from extractor.space.one_view import ContactTracker
+    from extractor.space.views import ContactTracker
     from extractor.track.tracker import Tracked, Tracker
 
 

@@ -29,6 +29,10 @@ Array = NDArray[np.float64]
 YOUNG_MPA = 0.3
 SIGMA_MM = np.array([0.001, 0.001, 0.003])
 LINEAR = ForceModel(strain_factor=0.0)
+EXACT = ForceModel(
+    strain_factor=0.0, strain_sigma=0.0, normal_error=0.0, shear_error=0.0, torque_error=0.0, shear_by_press=0.0,
+    centre_error_mm=0.0,
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +95,19 @@ def test_force_torque_and_utilisation_of_a_sheared_and_twisted_ball(
     np.testing.assert_allclose(sum(region.force_n for region in found.regions), found.force_n, atol=1e-9)
 
 
+def test_a_large_strain_needs_more_force(layout: Reference, gel: Gel) -> None:
+    """The strain factor grows with the square of force over area and modulus, region by region."""
+    press = Press(gel, (-3.0, 1.0, 2.0), (2.5, -1.0, 2.0))
+    linear = read(layout, gel, press.seen())
+    stiff = ContactReader(layout, gel, YOUNG_MPA, model=ForceModel(strain_factor=2.0)).read(
+        press.seen(), cov(layout)
+    )
+    for one, other in zip(linear.regions, stiff.regions, strict=True):
+        load = -one.force_n[2] / (one.area_mm2 * YOUNG_MPA)
+        assert other.force_n[2] == pytest.approx(one.force_n[2] * (1 + 2.0 * load**2), rel=1e-6)
+        assert other.force_cov_n2[2, 2] > one.force_cov_n2[2, 2]
+
+
 def test_regions_have_the_place_and_the_area_of_two_balls(layout: Reference, gel: Gel) -> None:
     press = Press(gel, (-3.0, 1.0, 2.0), (2.5, -1.0, 2.0))
     found = read(layout, gel, press.seen())
@@ -105,10 +122,9 @@ def test_regions_have_the_place_and_the_area_of_two_balls(layout: Reference, gel
 
 def test_stated_deviations_of_the_noise_are_true(layout: Reference, gel: Gel) -> None:
     # the loads are those of the model, so its own error is left out
-    model = ForceModel(normal_error=0.0, shear_error=0.0, torque_error=0.0, centre_error_mm=0.0)
     press = Press(gel, (0.5, 0.3, 2.4), shear=0.1)
     z = []
-    reader = ContactReader(layout, gel, YOUNG_MPA, model=model)
+    reader = ContactReader(layout, gel, YOUNG_MPA, model=EXACT)
     for seed in range(20):
         reader.reset()
         found = reader.read(press.seen(seed), cov(layout))
