@@ -13,19 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
+from benchmarks.force.seen import seen_from
 from benchmarks.force.truth import FRICTION, TRUTH, YOUNG_MPA, Case, cases
 from benchmarks.support.command import wide_console
+from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.finite_block import make_gel
 from cmpdesign.design.design import load_design
-from cmpdesign.layout.build import build_layout
-from extractor import ContactForce, ContactReader, View
+from extractor import ContactForce, ContactReader
 
 Array = NDArray[np.float64]
-SIGMA_MM = np.array([0.001, 0.001, 0.003])
-DEPTH_PLACE, DEPTH_MM = 1, 0.5  # of ``DEPTHS_MM``
+DEPTH_PLACE, DEPTH_MM = 0, 0.5  # of ``DEPTHS_MM``
 LEAST_N = 0.3  # of the summary's frames
-PX_PER_MM, SIGMA_PX = 14.0, 0.02  # of one view
 FLAT = ("twist", "punch", "ring")  # their touched area is not that of a ball
 
 
@@ -88,26 +87,13 @@ def read_case(
     case: Case, frames: list[dict[str, Array]], random: np.random.Generator, far_mm: float | None
 ) -> Iterator[Errors]:
     """The frames of a contact, read from two views' displacements, or from one view far away."""
-    reader = _reader(case.thickness_mm, case.poisson)
-    flat_mm = np.pad(reader.layout.xy_mm, [(0, 0), (0, 1)])
-    sigma, view = SIGMA_MM, None
-    if far_mm is not None:
-        focal = (PX_PER_MM * far_mm,) * 2
-        view = View(
-            "one", focal, (0.0, 0.0), R_camera_from_layout=np.eye(3), t_camera_from_layout_mm=(0, 0, far_mm)
-        )
-        reader, sigma = reader.seen(view.linearised(flat_mm).by_point), np.full(2, SIGMA_PX)
-    cov = np.tile(np.diag(sigma**2), (len(flat_mm), 1, 1))
+    seen = seen_from(_reader(case.thickness_mm, case.poisson), far_mm)
     for frame in frames:
-        moved = frame["displacement_mm"][DEPTH_PLACE].astype(np.float64)
-        if view is not None:
-            moved = view.project(flat_mm + moved) - view.project(flat_mm)
-        moved = moved + sigma * random.normal(size=moved.shape)
-        times_ms = []
-        reader.reset()
+        moved, times_ms = frame["displacement_mm"][DEPTH_PLACE].astype(np.float64), []
+        seen.reader.reset()
         for _ in range(2):
             start = time.process_time()
-            found = reader.read(moved, cov)
+            found = seen.read(moved, random)
             times_ms.append(1e3 * (time.process_time() - start))
         yield errors_of(found, frame, case.name, times_ms)
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 from scipy.sparse import bmat
 
+from benchmarks.force.seen import Seen, seen_from
 from benchmarks.large_strain import neo_hookean
 from benchmarks.large_strain.neo_hookean import PRESS_STEP_MM, NeoHookeanLayer
 from benchmarks.support.command import wide_console
@@ -32,7 +33,7 @@ PENALTY_PER_MODULUS = 600.0
 # thickness, radius of the ball, presses in steps of 0.1 mm
 PRESSES = ((4.0, 5.0, (5, 8, 11)), (4.0, 3.0, (4, 6, 8)), (4.0, 10.0, (4, 7)), (2.0, 5.0, (3, 5)))
 DEPTHS_MM, MARGIN_MM = (0.5, 1.0), 6.0
-SIGMA_MM, OFF_CENTRE_MM = np.array([0.001, 0.001, 0.003]), (0.2, 0.1)
+OFF_CENTRE_MM, YOUNG_MPA = (0.2, 0.1), 0.3
 
 
 class Pressed(NamedTuple):
@@ -100,34 +101,31 @@ def on_markers(xy_mm: Array, far_mm: Array, moved_mm: Array) -> Array:
 def main() -> int:
     """Print one row for every state and depth of markers."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--one-view", type=float, metavar="MM", help="distance of a single camera")
     parser.add_argument("--seed", type=int, default=1)
-    random = np.random.default_rng(parser.parse_args().seed)
+    args = parser.parse_args()
+    random, far_mm = np.random.default_rng(args.seed), np.linspace(0.0, 16.0, 129)
     layout = build_layout(load_design("honeycomb", {"layers": "6", "pitch_mm": "1.5"}))
-    cov = np.tile(np.diag(SIGMA_MM**2), (len(layout.marker_xy_mm), 1, 1))
     table = Table(
         "thickness", "ball", "press", "depth", "force, N", "read F / (A E)", "radius / thickness", "factor"
     )
-    far_mm = np.linspace(0.0, 16.0, 129)
-    readers: dict[tuple[float, float], ContactReader] = {}
+    readers: dict[tuple[float, float], Seen] = {}
     for thickness, radius, steps in PRESSES:
-        for state in pressed_states(
-            NeoHookeanLayer(Elastomer(thickness, 0.3, 0.5, 0.5), radius, NEAR_MM), steps, far_mm
-        ):
+        layer = NeoHookeanLayer(Elastomer(thickness, YOUNG_MPA, 0.5, 0.5), radius, NEAR_MM)
+        for state in pressed_states(layer, steps, far_mm):
             for depth in DEPTHS_MM:
                 if (thickness, depth) not in readers:
                     gel = make_gel(layout, Elastomer(thickness, 1.0, 0.5, depth), margin_mm=MARGIN_MM)
-                    readers[thickness, depth] = ContactReader(
-                        layout, gel, 0.3, model=ForceModel(strain_factor=0.0)
-                    )
-                reader, read = readers[thickness, depth], []
+                    linear = ContactReader(layout, gel, YOUNG_MPA, model=ForceModel(strain_factor=0.0))
+                    readers[thickness, depth] = seen_from(linear, args.one_view)
+                seen, read = readers[thickness, depth], []
                 for moved in (state.finite_mm[depth], state.linear_mm[depth]):
-                    reader.reset()
-                    noise = SIGMA_MM * random.normal(size=(len(cov), 3))
-                    read.append(reader.read(on_markers(layout.marker_xy_mm, far_mm, moved) + noise, cov))
+                    seen.reader.reset()
+                    read.append(seen.read(on_markers(layout.marker_xy_mm, far_mm, moved), random))
                 area = read[0].regions[0].area_mm2
                 table.add_row(
                     f"{thickness:g}", f"{radius:g}", f"{state.press_mm:.1f}", f"{depth:g}", f"{state.force_n:.3f}",
-                    f"{-read[0].force_n[2] / (area * 0.3):.3f}", f"{np.sqrt(area / np.pi) / thickness:.2f}",
+                    f"{-read[0].force_n[2] / (area * YOUNG_MPA):.3f}", f"{np.sqrt(area / np.pi) / thickness:.2f}",
                     f"{read[1].force_n[2] / read[0].force_n[2]:.4f}",
                 )  # fmt: skip
     wide_console(150).print(table)

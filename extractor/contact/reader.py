@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -63,6 +63,8 @@ class ForceModel:
 
 
 MODEL = ForceModel()
+# In one image a large strain does not make the force too small: python -m benchmarks.force.stiffening --one-view 60.
+ONE_VIEW = replace(MODEL, strain_factor=0.0)
 SMOOTH_SPACINGS = 0.8  # width of the smoothed loads; chosen
 BY_SHAPE = 0.3  # of force times radius, the torque by an error of the pressure's shape; chosen
 LEAST_SIGMAS = 3.0  # of the force, below which it is too little
@@ -117,13 +119,15 @@ class ContactReader:
         self._rim_mm = _distance_inside(gel.outline_mm, gel.loads_mm)
         self._support: NDArray[np.intp] | None = None
 
-    def seen(self, by_displacement: Array) -> ContactReader:
-        """A reader of other measured numbers than displacements in space, for example of those in one image.
+    def seen(self, by_displacement: Array, model: ForceModel = ONE_VIEW) -> ContactReader:
+        """A reader of other measured numbers than displacements in space: of those in one image.
 
         Args:
             by_displacement: (M, C, 3) derivatives of a marker's C measured numbers by its displacement in mm.
+            model: what the linear model is worth for these numbers.
         """
         other = copy(self)
+        other.model = model
         other._axes = by_displacement.shape[1]
         other._solver = TractionSolver(self.gel, by_displacement)
         other.reset()
@@ -231,12 +235,13 @@ class ContactReader:
         own = np.diag([sideways, sideways, upright]) + self.young_share**2 * np.outer(total, total)
         press = np.abs(part[:, 2])
         centre = press @ at / max(press.sum(), 1e-12)
-        radius = np.sqrt(press @ ((at - centre) ** 2).sum(axis=1) / max(press.sum(), 1e-12))
+        spread = press @ ((at - centre) ** 2).sum(axis=1) / max(press.sum(), 1e-12)
+        radius = max(float(np.sqrt(spread)), self.gel.spacing_mm)
         # an error of the forces turns by their arms, one of the pressure's shape by the radius
         whole_arm = np.append(centre, 0.0) - self.about_mm
         by_force = np.cross(np.eye(3), whole_arm).T
         size = model.torque_error * max(
-            float(np.abs(torque).max()), float(radius * np.linalg.norm(total)) * BY_SHAPE
+            float(np.abs(torque).max()), radius * float(np.linalg.norm(total)) * BY_SHAPE
         )
         own_torque = by_force @ own @ by_force.T + np.eye(3) * size**2
         return _Sum(
