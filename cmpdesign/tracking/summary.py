@@ -66,7 +66,7 @@ class TrackStatistics:
     """The statistics of a tracker's frames.
 
     Attributes:
-        farthest: the frame with the largest RMS displacement, for the quiver plot.
+        farthest: the frame of the largest displacement, for the quiver plot.
     """
 
     def __init__(self, reference: Reference) -> None:
@@ -81,7 +81,6 @@ class TrackStatistics:
         self._pairs, self._squares, self._values = 0, 0.0, 0
         self._contacts = ContactStatistics()
         self._largest = _LargestDisplacement()
-        self._farthest_px = -1.0
         self.farthest: Tracked | None = None
 
     @property
@@ -115,9 +114,7 @@ class TrackStatistics:
         if length[marker] > self._largest.px:
             mm = float(np.linalg.norm(frame.displacement_mm[marker]))
             self._largest = _LargestDisplacement(float(length[marker]), frame.index, marker, mm)
-        rms = float(np.sqrt(np.nanmean(length**2)))
-        if rms > self._farthest_px:
-            self._farthest_px, self.farthest = rms, frame
+            self.farthest = frame
         if np.nanmedian(length) >= AT_REST_PX:
             self._resting = None
             return
