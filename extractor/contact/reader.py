@@ -192,7 +192,8 @@ class ContactReader:
         for patch in patches:
             mine = patch.members
             load = -force[mine, 2].sum() / (patch.area_mm2 * self.young_mpa)
-            factor = 1 + self.model.strain_factor * load**2
+            # beyond the computed range, which the reason states, the factor does not grow
+            factor = 1 + self.model.strain_factor * min(load, self.model.largest_load) ** 2
             doubt[mine] = self.model.strain_sigma * load**2 * force[mine, 2]
             force[mine, 2] *= factor
             traction[support[mine], 2] *= factor

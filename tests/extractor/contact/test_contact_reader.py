@@ -106,6 +106,12 @@ def test_a_large_strain_needs_more_force(layout: Reference, gel: Gel) -> None:
         load = -one.force_n[2] / (one.area_mm2 * YOUNG_MPA)
         assert other.force_n[2] == pytest.approx(one.force_n[2] * (1 + 2.0 * load**2), rel=1e-6)
         assert other.force_cov_n2[2, 2] > one.force_cov_n2[2, 2]
+    beyond = 20 * Press(gel, (0.0, 0.0, 2.0)).moved
+    largest = (
+        ContactReader(layout, gel, YOUNG_MPA).read(beyond, cov(layout)).force_n[2]
+        / read(layout, gel, beyond).force_n[2]
+    )
+    assert 1.0 < largest < 1.2
 
 
 def test_regions_have_the_place_and_the_area_of_two_balls(layout: Reference, gel: Gel) -> None:
