@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from extractor.space.field import Field
     from extractor.space.medium import Medium, WindowPlane
     from extractor.space.reconstruction import Reconstructor, Shape
-    from extractor.space.rig import Rig, load_rig, parse_rig
+    from extractor.space.rig import Deviation, Rig, load_rig, parse_rig
     from extractor.space.triangulation import PointReason, triangulate
     from extractor.space.views import ContactTracker, ShapeFrame, ShapeTracker, ViewExtractor
     from extractor.track.displacement import Rest
@@ -49,6 +49,7 @@ __all__ = [
     "ContactReader",
     "ContactReason",
     "ContactTracker",
+    "Deviation",
     "Extractor",
     "ExtractorError",
     "Field",
@@ -99,6 +100,7 @@ _HOMES = {
     "ContactReader": "extractor.contact",
     "ContactReason": "extractor.contact",
     "ContactTracker": "extractor.space.views",
+    "Deviation": "extractor.space.rig",
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
     "ForceModel": "extractor.contact",
