@@ -60,7 +60,8 @@ class Places {
 // The level of a region as a share of its own contrast; its true outline is at a half.
 double own_share(const image::ContrastMap& map, const MomentShape& shape, double share, double least) {
   const auto x = static_cast<Index>(shape.x + 0.5), y = static_cast<Index>(shape.y + 0.5);
-  const double low = map.low(y / map.tile_px, x / map.tile_px), high = map.high(y / map.tile_px, x / map.tile_px);
+  const double low = map.low(y / map.tile_px, x / map.tile_px),
+               high = map.high(y / map.tile_px, x / map.tile_px);
   return std::max(share * (high - low), least) / std::max(map.value(y, x) - low, 1.0);
 }
 
@@ -78,7 +79,8 @@ std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index fi
         const MomentShape shape = shape_of(sums);
         const double triangle = limits.shape.quality(shape);
         if (triangle <= 0.0) continue;
-        const double quality = triangle - limits.level_weight * std::abs(std::log(2.0 * own_share(map, shape, share, least)));
+        const double quality =
+            triangle - limits.level_weight * std::abs(std::log(2.0 * own_share(map, shape, share, least)));
         Candidate found{shape.x, shape.y, sums.area(), quality, share, {}};
         fill_corners(shape, View<double, 2>(found.corner.data(), {3, 2}));
         all.push_back(found);
@@ -90,9 +92,10 @@ std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index fi
 }  // namespace
 
 FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index first, Index count,
-                                View<const double, 1> shares, View<const double, 2> center, View<const double, 1> area,
-                                View<const double, 3> corner, View<const double, 1> quality,
-                                View<const double, 1> height, const CandidateLimits& limits) {
+                                View<const double, 1> shares, View<const double, 2> center,
+                                View<const double, 1> area, View<const double, 3> corner,
+                                View<const double, 1> quality, View<const double, 1> height,
+                                const CandidateLimits& limits) {
   std::vector<Candidate> all = candidates_of(image, first, count, shares, limits);
   for (Index i = 0; i < center.size(); ++i) {
     Candidate one{center(i, 0), center(i, 1), area[i], quality[i], height[i], {}};
@@ -102,7 +105,8 @@ FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index first, 
   std::stable_sort(all.begin(), all.end(),
                    [](const Candidate& a, const Candidate& b) { return a.quality > b.quality; });
   double mean = 0.0;
-  for (const Candidate& one : all) mean += std::sqrt(one.area / EQUILATERAL) / static_cast<double>(all.size());
+  for (const Candidate& one : all)
+    mean += std::sqrt(one.area / EQUILATERAL) / static_cast<double>(all.size());
   Places places(all, 0.5 * mean);
   std::vector<const Candidate*> kept;
   for (const Candidate& one : all) {
@@ -111,8 +115,9 @@ FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index first, 
     kept.push_back(&one);
   }
   const auto number = static_cast<Index>(kept.size());
-  FoundCandidates out{Array<double, 2>({number, 2}), Array<double, 1>({number}), Array<double, 3>({number, 3, 2}),
-                      Array<double, 1>({number}), Array<double, 1>({number})};
+  FoundCandidates out{Array<double, 2>({number, 2}), Array<double, 1>({number}),
+                      Array<double, 3>({number, 3, 2}), Array<double, 1>({number}),
+                      Array<double, 1>({number})};
   auto& [centers, areas, corners, qualities, heights] = out;
   for (Index i = 0; i < number; ++i) {
     centers(i, 0) = kept[i]->x, centers(i, 1) = kept[i]->y;

@@ -20,7 +20,8 @@ struct Vector {
   friend Vector operator-(Vector a, Vector b) { return {a.x - b.x, a.y - b.y}; }
 };
 
-// The number of the step by which a neighbour shares corner i, where the neighbour's place is that of corner j.
+// The number of the step by which a neighbour shares corner i, where the neighbour's place is that of corner
+// j.
 constexpr Index step_of(int i, int j) {
   for (Index k = 0; k < STEPS; ++k)
     if (STEP_CORNERS[k][0] == i && STEP_CORNERS[k][1] == j) return k;
@@ -37,7 +38,10 @@ struct Contact {
 class Triangles {
  public:
   Triangles(View<const double, 2> center, View<const double, 3> corner)
-      : center_(center), corner_(corner.shape()), edge_({center.size()}), points_({CORNERS * center.size(), 2}) {
+      : center_(center),
+        corner_(corner.shape()),
+        edge_({center.size()}),
+        points_({CORNERS * center.size(), 2}) {
     for (Index i = 0; i < center.size(); ++i) {
       for (int k = 0; k < CORNERS; ++k)
         for (int axis = 0; axis < 2; ++axis) {
@@ -57,17 +61,20 @@ class Triangles {
     Array<double, 1> square({NEAREST});
     for (Index point = 0; point < points_.size(); ++point) {
       const Index i = point / CORNERS;
-      const Index found = numeric::fill_nearest_points(grid, points_(point, 0), points_(point, 1), index, square);
+      const Index found =
+          numeric::fill_nearest_points(grid, points_(point, 0), points_(point, 1), index, square);
       for (Index n = 0; n < found; ++n) {
         const Index other = index[n] / CORNERS;
         const double reach = tolerance * std::min(edge_[i], edge_[other]);
         if (other != i && square[n] < reach * reach)
-          add_contact(out, i, static_cast<int>(point % CORNERS), other, index[n] % CORNERS, direction_tolerance);
+          add_contact(out, i, static_cast<int>(point % CORNERS), other, index[n] % CORNERS,
+                      direction_tolerance);
       }
     }
     return out;
   }
-  // The distance between the corners of a contact, in edges of the smaller cell, of triangles without a swelling.
+  // The distance between the corners of a contact, in edges of the smaller cell, of triangles without a
+  // swelling.
   double misfit(const Contact& contact, double swelling) const {
     const Vector own = at(contact.from, STEP_CORNERS[contact.step][0]), way = way_of(contact);
     const Vector other = at(contact.to, STEP_CORNERS[contact.back][0]);
@@ -76,7 +83,8 @@ class Triangles {
   }
   // The distance of two cells at which their triangles would just meet, over their distance.
   double swelling(const Contact& contact) const {
-    const Vector met = at(contact.from, STEP_CORNERS[contact.step][0]) - at(contact.to, STEP_CORNERS[contact.back][0]);
+    const Vector met =
+        at(contact.from, STEP_CORNERS[contact.step][0]) - at(contact.to, STEP_CORNERS[contact.back][0]);
     const Vector way = way_of(contact);
     return (met.x * way.x + met.y * way.y) / std::max(way.x * way.x + way.y * way.y, 1e-12);
   }
@@ -114,8 +122,8 @@ class Triangles {
 // The best contact at each step of each cell (N, 6), or -1; only where both cells agree.
 class MutualContacts {
  public:
-  MutualContacts(const Triangles& triangles, const std::vector<Contact>& contacts, Index cells, double swelling,
-                 double tolerance)
+  MutualContacts(const Triangles& triangles, const std::vector<Contact>& contacts, Index cells,
+                 double swelling, double tolerance)
       : best_({cells, STEPS}, -1), misfit_({cells, STEPS}, tolerance), contacts_(contacts) {
     for (std::size_t n = 0; n < contacts.size(); ++n) {
       const Contact& one = contacts[n];
@@ -155,7 +163,8 @@ double swelling_of(const Triangles& triangles, const MutualContacts& contacts, I
 
 }  // namespace
 
-CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner, const CellMeshLimits& limits) {
+CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
+                     const CellMeshLimits& limits) {
   const Index count = center.size();
   Array<std::int32_t, 2> neighbours({count, STEPS}, -1);
   Array<std::int8_t, 2> back({count, STEPS}, std::int8_t{-1});
@@ -165,7 +174,8 @@ CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
     const Triangles triangles(center, corner);
     const auto contacts = triangles.contacts(limits.first_tolerance, limits.direction_tolerance);
     const MutualContacts first(triangles, contacts, count, 1.0, limits.first_tolerance);
-    swelling = std::min(std::max(swelling_of(triangles, first, count), limits.min_swelling), limits.max_swelling);
+    swelling =
+        std::min(std::max(swelling_of(triangles, first, count), limits.min_swelling), limits.max_swelling);
     const MutualContacts mutual(triangles, contacts, count, swelling, limits.tolerance);
     for (Index i = 0; i < count; ++i)
       for (Index k = 0; k < STEPS; ++k) {

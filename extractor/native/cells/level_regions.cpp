@@ -9,7 +9,7 @@ namespace cmp::cells {
 
 namespace {
 
-constexpr Index BANDS = 4;        // of a tile
+constexpr Index BANDS = 4;          // of a tile
 constexpr float FIXED_ONE = 64.0F;  // of a level; interpolated levels are integers
 
 // A horizontal run of pixels above the level.
@@ -115,7 +115,7 @@ std::vector<Run> runs_above(const image::ContrastMap& map, double share, double 
   Array<std::int16_t, 1> levels({width});
   Array<float, 1> line({tiles.size(1)});
   Array<std::uint8_t, 1> mask({(width + 8) / 8 * 8}, std::uint8_t{0});  // ends outside a region
-  const Index band = std::max<Index>(map.tile_px / BANDS, 1);  // rows with the same levels, for time
+  const Index band = std::max<Index>(map.tile_px / BANDS, 1);           // rows with the same levels, for time
   for (Index y = 0; y < height; ++y) {
     if (y % band == 0) fill_row_levels(tiles, map.tile_px, y + band / 2, levels, line);
     fill_mask(map.value[y], levels, mask.slice(0, width));

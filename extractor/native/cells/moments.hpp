@@ -34,12 +34,12 @@ struct MomentSums {
 
 // The shape of a region, and what gives the corners of its triangle.
 struct MomentShape {
-  double x = 0.0, y = 0.0;                    // the center
-  double triangularity = 0.0;                 // 1 for a triangle, 0 for a disc, an ellipse or a square
-  double solidity = 0.0;                      // 1 for a triangle, 1.21 for an ellipse, less for ragged regions
-  double elongation = 0.0;                    // (trace of the covariance)^2 / determinant; 4 is equilateral
-  double a = 0.0, b = 0.0, c = 0.0;           // the Cholesky factor of the covariance: a; b, c
-  double real = 0.0, imaginary = 0.0;         // the third complex moment
+  double x = 0.0, y = 0.0;             // the center
+  double triangularity = 0.0;          // 1 for a triangle, 0 for a disc, an ellipse or a square
+  double solidity = 0.0;               // 1 for a triangle, 1.21 for an ellipse, less for ragged regions
+  double elongation = 0.0;             // (trace of the covariance)^2 / determinant; 4 is equilateral
+  double a = 0.0, b = 0.0, c = 0.0;    // the Cholesky factor of the covariance: a; b, c
+  double real = 0.0, imaginary = 0.0;  // the third complex moment
 };
 
 // The shape by the sums; all zero for a region on one line.
@@ -64,7 +64,8 @@ inline MomentShape shape_of(const MomentSums& sums) {
   const double ia = 1.0 / a, ic = 1.0 / c, ib = -b * ia * ic;
   const double uuu = ia * ia * ia * xxx, uuv = ia * ia * (ib * xxx + ic * xxy);
   const double uvv = ia * (ib * ib * xxx + 2 * ib * ic * xxy + ic * ic * xyy);
-  const double vvv = ib * ib * ib * xxx + 3 * ib * ib * ic * xxy + 3 * ib * ic * ic * xyy + ic * ic * ic * yyy;
+  const double vvv =
+      ib * ib * ib * xxx + 3 * ib * ib * ic * xxy + 3 * ib * ic * ic * xyy + ic * ic * ic * yyy;
   out.a = a, out.b = b, out.c = c;
   out.real = uuu - 3 * uvv, out.imaginary = 3 * uuv - vvv;
   out.triangularity = std::sqrt(out.real * out.real + out.imaginary * out.imaginary) / THIRD_MOMENT;
@@ -92,9 +93,8 @@ struct ShapeLimits {
   double quality(const MomentShape& shape) const {
     const bool is_triangle = shape.elongation <= max_elongation && shape.solidity >= min_solidity &&
                              shape.solidity <= max_solidity;
-    return is_triangle
-               ? std::min(shape.triangularity, 1.0) - ragged_weight * std::abs(shape.solidity - 1.0)
-               : -1.0;
+    return is_triangle ? std::min(shape.triangularity, 1.0) - ragged_weight * std::abs(shape.solidity - 1.0)
+                       : -1.0;
   }
 
   template <class F>

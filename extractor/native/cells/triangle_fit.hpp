@@ -8,7 +8,8 @@
 
 namespace cmp::cells {
 
-// Corners (N, 3, 2), clockwise with y down; qualities (N,), at most 1, negative for regions that are no triangles.
+// Corners (N, 3, 2), clockwise with y down; qualities (N,), at most 1, negative for regions that are no
+// triangles.
 using FittedTriangles = std::tuple<Array<double, 3>, Array<double, 1>>;
 
 // moments (N, 10) of regions about their seeds (N, 2).

@@ -9,7 +9,8 @@ namespace cmp::image {
 namespace {
 
 constexpr Index CHANNELS = 3;
-// The weights of blue, green and red in each map, and the divisor and the offset that keep it within 0 to 255.
+// The weights of blue, green and red in each map, and the divisor and the offset that keep it within 0 to
+// 255.
 struct Mix {
   std::int32_t blue, green, red, divisor, offset;
 };
@@ -20,10 +21,10 @@ constexpr std::array<Mix, CONTRAST_MAPS> MIXES{{{1, 0, 0, 1, 0},
                                                 {2, -1, -1, 4, 128},
                                                 {-1, 2, -1, 4, 128},
                                                 {-1, -1, 2, 4, 128}}};
-constexpr Index NOISE_STRIDE = 3;        // of the rows and columns in which noise is measured, for time
-constexpr double QUANTILE = 0.3;         // of the differences' sizes
+constexpr Index NOISE_STRIDE = 3;          // of the rows and columns in which noise is measured, for time
+constexpr double QUANTILE = 0.3;           // of the differences' sizes
 constexpr double NORMAL_QUANTILE = 0.385;  // the same of a normal distribution
-constexpr double SMOOTHED = 0.375;       // noise after smoothing over noise before
+constexpr double SMOOTHED = 0.375;         // noise after smoothing over noise before
 
 using Line = View<std::uint16_t, 1>;
 

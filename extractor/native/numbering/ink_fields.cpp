@@ -30,7 +30,8 @@ std::vector<Color> light_at_points(const image::PyramidLevel& view, View<const d
   const auto scale = static_cast<double>(view.scale);
   const Index height = view.image.size(0), width = view.image.size(1);
   const auto flat = view.image.flat();
-  const double right = static_cast<double>(width) - numeric::BORDER_PX, bottom = static_cast<double>(height) - numeric::BORDER_PX;
+  const double right = static_cast<double>(width) - numeric::BORDER_PX,
+               bottom = static_cast<double>(height) - numeric::BORDER_PX;
   constexpr double ONE = 1.0 / (numeric::SUBPIXEL_STEPS * numeric::SUBPIXEL_STEPS);
   std::vector<Color> out(static_cast<std::size_t>(xy.size()), Color{NOWHERE, NOWHERE, NOWHERE});
   for (Index i = 0; i < xy.size(); ++i) {
@@ -175,7 +176,8 @@ Array<double, 2> odds_of(const std::vector<ColorField>& fields, View<const doubl
         residual += std::abs(light[i][c] - field[c]);
         strength += std::max(field[c], 0.0);
       }
-      const double ratio = residual / std::max(2.0 * fields[k].scatter(), limits.least_scatter * strength + 1e-6);
+      const double ratio =
+          residual / std::max(2.0 * fields[k].scatter(), limits.least_scatter * strength + 1e-6);
       odds(i, k) = -0.5 * ratio * ratio;
     }
     // relative to the likeliest class: a color that fits none says nothing
@@ -190,8 +192,8 @@ double distance(const Color& a, const Color& b) {
   return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
 }
 
-// From a down-cell's center to those of the up-cells that share its sides, in steps of the lattice; its corners lie on the
-// other sides.
+// From a down-cell's center to those of the up-cells that share its sides, in steps of the lattice; its
+// corners lie on the other sides.
 constexpr double THIRD = 1.0 / 3.0;
 constexpr double SIDE_STEPS[SIDES][2] = {{2 * THIRD, -THIRD}, {-THIRD, -THIRD}, {-THIRD, 2 * THIRD}};
 constexpr Index SIDE_CLASS[SIDES] = {0, 2, 1};  // of these up-cells, relative to the class of the first
@@ -201,10 +203,14 @@ class DownLight {
  public:
   DownLight(const image::PyramidLevel& view, const DownCells& down, const std::vector<ColorField>& fields,
             const InkFieldLimits& limits)
-      : view_(view), down_(down), fields_(fields), limits_(limits), light_(light_at_points(view, down.xy())) {}
+      : view_(view),
+        down_(down),
+        fields_(fields),
+        limits_(limits),
+        light_(light_at_points(view, down.xy())) {}
 
-  // (D,) light over that of the down-cells around, relative to the strongest inks there; NaN outside the image. (D,)
-  // whether the light fills the triangle of a bright down-cell, and no cell beside it.
+  // (D,) light over that of the down-cells around, relative to the strongest inks there; NaN outside the
+  // image. (D,) whether the light fills the triangle of a bright down-cell, and no cell beside it.
   std::pair<Array<double, 1>, Array<bool, 1>> whiteness() const {
     const Color usual = median_color(light_);
     Array<double, 1> whiteness({down_.size()}, NOWHERE);
@@ -217,7 +223,8 @@ class DownLight {
         const std::int32_t other = down_.number(down_.q(n) + step[0], down_.r(n) + step[1]);
         if (other >= 0 && std::isfinite(light_[other][0])) around.push_back(light_[other]);
       }
-      const Color black = around.size() < 2 ? usual : median_color(around), over = difference(light_[n], black);
+      const Color black = around.size() < 2 ? usual : median_color(around),
+                  over = difference(light_[n], black);
       double own = 0.0, most = 0.0;
       for (Index c = 0; c < CHANNELS; ++c) {
         double strongest = 0.0;
@@ -245,7 +252,8 @@ class DownLight {
     }
     return {x / count, y / count};
   }
-  // Whether the light of a down-cell reaches towards its corners, and the cells beside it have their own inks.
+  // Whether the light of a down-cell reaches towards its corners, and the cells beside it have their own
+  // inks.
   bool fills_triangle(Index n, const Color& black, const Color& white) const {
     const auto u = step_px(n, 1, 0), v = step_px(n, 0, 1);
     Array<double, 2> xy({2 * SIDES, 2});
@@ -256,7 +264,8 @@ class DownLight {
         xy(SIDES + k, axis) = down_.xy()(n, axis) + limits_.across_side * way;
       }
     const auto light = light_at_points(view_, xy);
-    const Index first = class_of({static_cast<std::int32_t>(down_.q(n)), static_cast<std::int32_t>(down_.r(n))});
+    const Index first =
+        class_of({static_cast<std::int32_t>(down_.q(n)), static_cast<std::int32_t>(down_.r(n))});
     const double full = distance(white, {});
     for (Index k = 0; k < SIDES; ++k) {
       const Color corner = difference(light[k], black), beside = difference(light[SIDES + k], black);
@@ -275,12 +284,14 @@ class DownLight {
 };
 
 // The share of a part's cells whose color is like that of their class's field.
-double fit_of(const std::vector<ColorField>& fields, const WalkedCells& cells, const std::vector<Color>& light,
-              const std::vector<Index>& members, const InkFieldLimits& limits) {
+double fit_of(const std::vector<ColorField>& fields, const WalkedCells& cells,
+              const std::vector<Color>& light, const std::vector<Index>& members,
+              const InkFieldLimits& limits) {
   double count = 0.0, alike = 0.0;
   for (const Index i : members) {
     if (!std::isfinite(light[i][0])) continue;
-    const Color field = fields[class_of({cells.axial(i, 0), cells.axial(i, 1)})].at(cells.center_px(i, 0), cells.center_px(i, 1));
+    const Color field = fields[class_of({cells.axial(i, 0), cells.axial(i, 1)})].at(cells.center_px(i, 0),
+                                                                                    cells.center_px(i, 1));
     count += 1.0;
     alike += distance(light[i], field) < limits.likeness * distance(field, {});
   }
@@ -339,8 +350,12 @@ InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, 
     axial(n, 1) = static_cast<std::int32_t>(down.r(n));
   }
   auto [whiteness, is_triangle] = DownLight(view, down, fields, limits).whiteness();
-  return {shares_of(fields, cells.center_px, members, limits), odds_of(fields, cells.center_px, light, limits),
-          std::move(axial), std::move(whiteness), std::move(is_triangle), fit_of(fields, cells, light, members, limits)};
+  return {shares_of(fields, cells.center_px, members, limits),
+          odds_of(fields, cells.center_px, light, limits),
+          std::move(axial),
+          std::move(whiteness),
+          std::move(is_triangle),
+          fit_of(fields, cells, light, members, limits)};
 }
 
 }  // namespace cmp::numbering

@@ -100,8 +100,10 @@ class Walk {
         const AxialStep step = axial_step(j, here.first);
         const int first = first_corner(links_.back(here.cell, j), {-step.q, -step.r});
         if (first < 0) continue;
-        waiting.push({std::max(here.misfit, links_.misfit(here.cell, j)), to,
-                      {here.place.q + step.q, here.place.r + step.r}, first});
+        waiting.push({std::max(here.misfit, links_.misfit(here.cell, j)),
+                      to,
+                      {here.place.q + step.q, here.place.r + step.r},
+                      first});
       }
     }
     ++parts_;

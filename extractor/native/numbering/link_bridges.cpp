@@ -12,12 +12,16 @@ using cells::STEPS;
 
 constexpr std::int32_t NEW = -1;
 
-// A search in depth (Tarjan 1974, "A note on finding the bridges of a graph"): a cell from which no loop leads back
-// before it is the first one of a part without bridges.
+// A search in depth (Tarjan 1974, "A note on finding the bridges of a graph"): a cell from which no loop
+// leads back before it is the first one of a part without bridges.
 class BridgeSearch {
  public:
   BridgeSearch(const CellLinks& links, View<const std::int32_t, 1> part)
-      : links_(links), part_(part), order_({part.size()}, NEW), low_({part.size()}, NEW), out_({part.size()}, NEW) {}
+      : links_(links),
+        part_(part),
+        order_({part.size()}, NEW),
+        low_({part.size()}, NEW),
+        out_({part.size()}, NEW) {}
 
   Array<std::int32_t, 1> parts() && {
     for (Index i = 0; i < part_.size(); ++i)

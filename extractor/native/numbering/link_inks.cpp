@@ -13,7 +13,8 @@ namespace {
 using cells::STEPS;
 
 constexpr double FAR = std::numeric_limits<double>::infinity();
-// The class of the neighbour at each step of cells::STEP_CORNERS, relative to the cell's; a turn does not change it.
+// The class of the neighbour at each step of cells::STEP_CORNERS, relative to the cell's; a turn does not
+// change it.
 constexpr int CLASS_STEP[STEPS] = {1, -1, -1, 1, -1, 1};
 
 double distance(View<const double, 2> light, Index i, Index j) {
@@ -50,7 +51,8 @@ bool is_contradicted(const CellLinks& links, View<const double, 2> light, Index 
 
 }  // namespace
 
-Array<bool, 2> contradicted_links(const CellLinks& links, View<const double, 2> light, const LinkInkLimits& limits) {
+Array<bool, 2> contradicted_links(const CellLinks& links, View<const double, 2> light,
+                                  const LinkInkLimits& limits) {
   const Index count = links.neighbours.size();
   Array<bool, 2> bad({count, STEPS}, false);
   for (Index i = 0; i < count; ++i)

@@ -52,10 +52,10 @@ std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const do
     if (known.empty()) continue;
     const Index first = image_cell[known[0]];
     const double x_mm = layout.center_mm(known[0], 0), y_mm = layout.center_mm(known[0], 1);
-    LocalMap map({x_mm, y_mm, layout.size_mm[u], center(first, 0), center(first, 1), 1.0},
-                 limits.prior);
+    LocalMap map({x_mm, y_mm, layout.size_mm[u], center(first, 0), center(first, 1), 1.0}, limits.prior);
     for (const std::int32_t v : known)
-      map.add(layout.center_mm(v, 0), layout.center_mm(v, 1), center(image_cell[v], 0), center(image_cell[v], 1));
+      map.add(layout.center_mm(v, 0), layout.center_mm(v, 1), center(image_cell[v], 0),
+              center(image_cell[v], 1));
     if (!map.solve()) continue;
     found.push_back(static_cast<std::int32_t>(u));
     for (int k = 0; k < 3; ++k) {

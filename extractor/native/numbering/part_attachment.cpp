@@ -57,7 +57,7 @@ class PlacedCells {
 // The map through the placed cells around a part.
 struct Support {
   LocalMap map;
-  LocalMap stiff;     // the same with little bending, to look for places across a gap
+  LocalMap stiff;  // the same with little bending, to look for places across a gap
   double edge_px;
   double misfit;      // of the placed cells alone
   std::int32_t near;  // the layout's cell of the nearest placed cell
@@ -143,7 +143,8 @@ class Attachment {
     // the cells of the part that are nearest to its first one
     std::vector<Index> judged(part);
     std::sort(judged.begin(), judged.end(), [&](Index a, Index b) {
-      return std::hypot(x(a) - x(part[0]), y(a) - y(part[0])) < std::hypot(x(b) - x(part[0]), y(b) - y(part[0]));
+      return std::hypot(x(a) - x(part[0]), y(a) - y(part[0])) <
+             std::hypot(x(b) - x(part[0]), y(b) - y(part[0]));
     });
     judged.resize(std::min(judged.size(), static_cast<std::size_t>(limits_.judged_cells)));
     const auto support = support_of(judged[0], placed);
@@ -163,7 +164,8 @@ class Attachment {
           second = {motion, score};
         }
       }
-    // the cells beside a cut are cut themselves; the best motion must be far better than the second, not perfect
+    // the cells beside a cut are cut themselves; the best motion must be far better than the second, not
+    // perfect
     const double least = -limits_.max_misfit * static_cast<double>(judged.size());
     const double margin = limits_.margin - limits_.margin_of_misfit * best.score;
     if (best.score < least || best.score - second.score < margin) return false;
@@ -183,7 +185,8 @@ class Attachment {
                          placed.x(near[0]),       placed.y(near[0]),       edge_px};
     const localmap::MapPrior stiff{limits_.prior.noise, limits_.prior.quadratic * limits_.stiffness,
                                    limits_.prior.cubic * limits_.stiffness};
-    Support out{LocalMap(frame, limits_.prior), LocalMap(frame, stiff), edge_px, 0.0, static_cast<std::int32_t>(u)};
+    Support out{LocalMap(frame, limits_.prior), LocalMap(frame, stiff), edge_px, 0.0,
+                static_cast<std::int32_t>(u)};
     for (const Index n : near) {
       const Index v = placed.of_layout(n);
       out.map.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
@@ -226,7 +229,8 @@ class Attachment {
   // In edges, how far around a place of the map others are tried.
   double reach_at(const Support& support, std::int32_t u) const {
     const MappedPoint point = support.map.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
-    return std::min(limits_.reach, 1.0 + limits_.reach_deviations * std::sqrt(point.variance) / support.edge_px);
+    return std::min(limits_.reach,
+                    1.0 + limits_.reach_deviations * std::sqrt(point.variance) / support.edge_px);
   }
   // From the place of a layout's cell by the stiff map to a cell of the image, in edges.
   double distance_to(const Support& support, std::int32_t u, Index i) const {
@@ -274,8 +278,9 @@ class Attachment {
     for (int first = 0; first < 3; ++first) {
       double most = 0.0;
       for (int k = 0; k < 3; ++k)
-        most = std::max(most, std::hypot(cells_.corner_px(i, (first + k) % 3, 0) - x(i) - expected[2 * k],
-                                         cells_.corner_px(i, (first + k) % 3, 1) - y(i) - expected[2 * k + 1]));
+        most =
+            std::max(most, std::hypot(cells_.corner_px(i, (first + k) % 3, 0) - x(i) - expected[2 * k],
+                                      cells_.corner_px(i, (first + k) % 3, 1) - y(i) - expected[2 * k + 1]));
       if (most < limits_.max_corner_misfit * edge_px) return true;
     }
     return false;
@@ -291,15 +296,16 @@ class Attachment {
   Array<std::int32_t, 1> seen_;  // the search in which a cell of the layout was last seen
   std::int32_t search_ = 0;
   std::vector<std::vector<Index>> parts_;
-  std::vector<double> tried_at_;  // the squared distance of each part from placed cells when it was last tried
+  std::vector<double>
+      tried_at_;  // the squared distance of each part from placed cells when it was last tried
 };
 
 }  // namespace
 
 Array<std::int32_t, 1> attach_parts(const WalkedCells& cells, View<const std::int32_t, 1> cell,
                                     View<const double, 2> odds, const layout::LayoutCells& layout,
-                                    View<const std::int32_t, 2> axial, View<const std::int32_t, 2> cell_lookup,
-                                    const AttachmentLimits& limits) {
+                                    View<const std::int32_t, 2> axial,
+                                    View<const std::int32_t, 2> cell_lookup, const AttachmentLimits& limits) {
   Array<std::int32_t, 1> out(cell);
   Attachment(cells, odds, layout, axial, cell_lookup, limits, out).place_all();
   return out;

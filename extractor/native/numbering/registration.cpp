@@ -56,8 +56,8 @@ class WhitePlaces {
 };
 
 // The number of places inside the layout after a shift; -1 where more than `most` lie outside.
-std::int64_t count_inside(const std::vector<AxialStep>& places, std::int32_t dq, std::int32_t dr, std::int64_t most,
-                          View<const std::int32_t, 2> cell_lookup) {
+std::int64_t count_inside(const std::vector<AxialStep>& places, std::int32_t dq, std::int32_t dr,
+                          std::int64_t most, View<const std::int32_t, 2> cell_lookup) {
   std::int64_t outside = 0;
   for (const AxialStep& a : places)
     if (layout::cell_at(cell_lookup, a.q + dq, a.r + dr) < 0 && ++outside > most) return -1;
@@ -70,11 +70,13 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
                       View<const std::int32_t, 2> white_axial, View<const double, 1> white,
                       const RegisteredLayout& layout, const WitnessLimits& limits) {
   const WhitePlaces whites(white_axial, white);
-  const auto most = std::max(
-      limits.min_outside, static_cast<std::int64_t>(limits.max_outside_share * static_cast<double>(axial.size())));
+  const auto most =
+      std::max(limits.min_outside,
+               static_cast<std::int64_t>(limits.max_outside_share * static_cast<double>(axial.size())));
   std::vector<AxialStep> cells, of_layout;
   for (Index i = 0; i < axial.size(); ++i) cells.push_back({axial(i, 0), axial(i, 1)});
-  for (Index u = 0; u < layout.axial.size(); ++u) of_layout.push_back({layout.axial(u, 0), layout.axial(u, 1)});
+  for (Index u = 0; u < layout.axial.size(); ++u)
+    of_layout.push_back({layout.axial(u, 0), layout.axial(u, 1)});
   std::array<Extent, 3> allowed;
   for (int axis = 0; axis < 3; ++axis) allowed[axis] = trimmed_extent(of_layout, axis, 0.0);
   std::vector<ScoredMotion> found;
@@ -92,17 +94,19 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
         const double odds = whites.at(moved_back_down({0, 0}, motion));  // the down-cell (0, 0) is white
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
         const double outside = static_cast<double>(axial.size() - inside);
-        found.push_back({motion,
-                         naming[((shift % 3) + 3) % 3] + odds - limits.outside_weight * outside, inside, odds});
+        found.push_back(
+            {motion, naming[((shift % 3) + 3) % 3] + odds - limits.outside_weight * outside, inside, odds});
       }
   }
-  std::stable_sort(found.begin(), found.end(), [](const ScoredMotion& a, const ScoredMotion& b) { return a.score > b.score; });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const ScoredMotion& a, const ScoredMotion& b) { return a.score > b.score; });
   const Index count = std::min<Index>(static_cast<Index>(found.size()), limits.max_motions);
   Array<std::int32_t, 2> motions({count, 3});
   Array<double, 1> scores({count}), odds({count});
   Array<std::int64_t, 1> inside({count});
   for (Index k = 0; k < count; ++k) {
-    motions(k, 0) = found[k].motion.turn, motions(k, 1) = found[k].motion.dq, motions(k, 2) = found[k].motion.dr;
+    motions(k, 0) = found[k].motion.turn, motions(k, 1) = found[k].motion.dq,
+               motions(k, 2) = found[k].motion.dr;
     scores[k] = found[k].score, odds[k] = found[k].white, inside[k] = found[k].inside;
   }
   return {std::move(motions), std::move(scores), std::move(inside), std::move(odds)};

@@ -1,4 +1,5 @@
-// Registration of a connected part: of all turns and shifts of its lattice the one that the witnesses agree on.
+// Registration of a connected part: of all turns and shifts of its lattice the one that the witnesses agree
+// on.
 #pragma once
 
 #include <tuple>
@@ -16,7 +17,8 @@ struct WitnessLimits {
 
   template <class F>
   static WitnessLimits read(const F& f) {
-    return {f["outside_weight"], f["max_outside_share"], f["min_outside"], f["trimmed_share"], f["max_motions"]};
+    return {f["outside_weight"], f["max_outside_share"], f["min_outside"], f["trimmed_share"],
+            f["max_motions"]};
   }
 };
 
@@ -33,7 +35,8 @@ struct RegisteredLayout {
 
 // The K best motions, the best first: (K, 3) turn, dq and dr; scores (K,), log odds; inside (K,), how many
 // cells lie in the layout; white (K,), the log odds of the white place alone.
-using Motions = std::tuple<Array<std::int32_t, 2>, Array<double, 1>, Array<std::int64_t, 1>, Array<double, 1>>;
+using Motions =
+    std::tuple<Array<std::int32_t, 2>, Array<double, 1>, Array<std::int64_t, 1>, Array<double, 1>>;
 
 // Motions of a part's N cells: `turn` rotations by 120 degrees about marker 0, then a shift.
 //
