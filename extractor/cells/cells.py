@@ -1,7 +1,7 @@
 """Stages 2 and 3: the cells of an image by contrast over the local black, in whatever channels show them best.
 
-A cell is a triangle that is brighter than the black around it. Seven maps show cells: the sum of the channels, each
-channel, and each channel over the mean of the others. In each map the regions above a share of the local contrast are
+A cell is a triangle that is brighter than the black around it. Seven maps show cells: each channel, the sum of the
+channels, and each channel over the mean of the others. In each map the regions above a share of the local contrast are
 taken; regions with the moments of triangles may be cells. Of several at one place the best triangle is kept. No hue and
 no color of the light is assumed.
 """
@@ -52,7 +52,8 @@ class CellLimits(NamedTuple):
         min_contrast_deviations: least contrast, in standard deviations of the noise. Chosen.
         level_weight: in the quality, of the logarithm of a region's level over half of its contrast, where the true
             outline is. Chosen.
-        tile_px: of the tiles of local levels; a cell and its black neighbours fit into three by three.
+        tile_px: of the tiles of local levels; a cell and its black neighbours fit into three by three. Derived:
+            half of the largest edge.
     """
 
     shape: ShapeLimits = ShapeLimits()
@@ -79,10 +80,10 @@ class Effort(NamedTuple):
     shares: NDArray[np.float64]
 
 
-# Most images show every cell in a channel of its own, and the white one in the sum; the others are looked at closely.
+# Most images show every cell in a channel of its own; the others are looked at closely.
 # Chosen, for time.
 EFFORTS = (
-    Effort(4, np.array([0.5])),
+    Effort(3, np.array([0.5])),
     Effort(7, np.array([0.32, 0.5, 0.65])),
     Effort(7, np.array([0.2, 0.42, 0.75])),
 )

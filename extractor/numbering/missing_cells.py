@@ -16,7 +16,7 @@ class MissingCellLimits(NamedTuple):
     """Limits of predicted cells.
 
     Attributes:
-        prior: of the map through the cells around.
+        prior: of the map through the cells around. Chosen, see ``MapPrior``.
         min_neighbours: numbered cells that share a corner with a predicted one; with those around them they determine
             a map. Chosen.
     """

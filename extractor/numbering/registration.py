@@ -94,7 +94,7 @@ class AttachmentLimits(NamedTuple):
     """Limits of parts that are registered against placed ones.
 
     Attributes:
-        prior: of the map.
+        prior: of the map. Chosen, see ``MapPrior``.
         known_cells: placed cells through which a map goes. Chosen.
         judged_cells: cells of a part by which its motion is judged, those nearest to placed ones. Chosen.
         max_rounds: passes over all parts. Chosen.
@@ -107,7 +107,7 @@ class AttachmentLimits(NamedTuple):
         outside_odds: log likelihood of a cell that lies outside, on a taken place, or nowhere near. Chosen.
         margin: lead of the best motion. Chosen.
         margin_of_misfit: the same, in addition, relative to the misfit of the best motion. Chosen.
-        with_single_cells: cells without a part are registered, too.
+        with_single_cells: cells without a part are registered, too. Measured: rule "single cells".
     """
 
     prior: MapPrior = MapPrior()

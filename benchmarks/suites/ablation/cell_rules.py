@@ -45,8 +45,8 @@ CELLS = (
         "cells are sought in each channel over the mean of the others, too",
         "accuracy",
         "extractor/cells/cells.py",
-        "(view.image), 0, effort.maps,",
-        "(view.image), 0, EFFORTS[0].maps,",
+        "        effort.maps,\n",
+        "        EFFORTS[0].maps,\n",
     ),
     Rule(
         "many levels",

@@ -85,8 +85,8 @@ REGISTRATION = (
         "the colors of a pattern follow the classes of its lattice",
         "no wrong id",
         "extractor/numbering/registration.py",
-        "MIN_CLASS_FIT = 0.55",
-        "MIN_CLASS_FIT = 0.0",
+        "MIN_FIT = 0.75",
+        "MIN_FIT = 0.0",
     ),
     Rule(
         "side",

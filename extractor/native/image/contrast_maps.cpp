@@ -13,10 +13,10 @@ constexpr Index CHANNELS = 3;
 struct Mix {
   std::int32_t blue, green, red, divisor, offset;
 };
-constexpr std::array<Mix, CONTRAST_MAPS> MIXES{{{1, 1, 1, 3, 0},
-                                                {1, 0, 0, 1, 0},
+constexpr std::array<Mix, CONTRAST_MAPS> MIXES{{{1, 0, 0, 1, 0},
                                                 {0, 1, 0, 1, 0},
                                                 {0, 0, 1, 1, 0},
+                                                {1, 1, 1, 3, 0},
                                                 {2, -1, -1, 4, 128},
                                                 {-1, 2, -1, 4, 128},
                                                 {-1, -1, 2, 4, 128}}};

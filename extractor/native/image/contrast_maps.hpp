@@ -5,7 +5,7 @@
 
 namespace cmp::image {
 
-// The sum of the channels; each channel; each channel over the mean of the others.
+// Each channel; the sum of the channels; each channel over the mean of the others.
 inline constexpr Index CONTRAST_MAPS = 7;
 
 // A map with its local levels at the middles of tiles.
