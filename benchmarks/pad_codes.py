@@ -19,7 +19,7 @@ from extractor.layout.lattice_tables import Lattice, lattice_of
 from extractor.numbering.code_bits import STEPS_BESIDE
 from extractor.numbering.ink_fields import LIMITS, InkFields, Palette
 from extractor.numbering.lattice_walk import WalkedCells
-from extractor.numbering.registration import BrightPlaces, Registration, SeenPart
+from extractor.numbering.registration import BrightPlaces, PlacedPart, Registration, SeenPart
 
 CODES = 16
 NAMING_LEAD = 20.0  # log odds of the right naming; the inks are seen
@@ -73,7 +73,7 @@ def abused_whiteness(
     """(D,) whiteness with noise, misread bits, glare that shows cells white, and dirt."""
     misread = rng.random(len(white)) < rng.choice([0.0, 0.02, 0.05, 0.1, 0.15])
     whiteness = (white ^ misread) + rng.normal(0.0, rng.uniform(0.02, 0.3), len(white))
-    for _ in range(rng.integers(3)):
+    for _ in range(rng.integers(3) if len(white) else 0):
         blob = np.hypot(*(places - places[rng.integers(len(places))]).T) < rng.uniform(0.5, 4.0)
         whiteness[blob] = rng.choice([0.0, 0.9, 1.2, np.nan])
     return whiteness
@@ -87,19 +87,25 @@ def moved(axial: NDArray[np.int32], motion: NDArray[np.integer], up: bool) -> ND
     return np.ascontiguousarray(axial + motion[1:], dtype=np.int32)
 
 
-def abused_part(pad: Pad, rng: np.random.Generator) -> tuple[SeenPart, NDArray[np.int32], int]:
-    """A part in a frame of its own, the places (P, 2) of its cells, and the number of its bits that can be seen."""
-    part = chosen_part(pad.lattice.axial @ LATTICE_STEPS, rng)
-    places = pad.lattice.axial[part]
+def down_cells_of(pad: Pad, places: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(D,) the pad's down-cells that share a side with cells (P, 2)."""
     beside = (pad.down[:, None] + STEPS_BESIDE)[:, :, None]
-    near = (beside == places).all(axis=-1).any(axis=-1).any(axis=-1) if len(places) else np.zeros(len(pad.down), bool)
-    whiteness = abused_whiteness(pad.is_white[near], pad.down[near] @ LATTICE_STEPS, rng)
-    motion = rng.integers((0, -40, -40), (3, 41, 41))
-    axial, down = moved(places, motion, up=True), moved(pad.down[near], motion, up=False)
-    # the class k of the frame is the class k + t of the layout
-    shift = (places[0] - axial[0]) @ [1, -1] % 3 if len(places) else 0
+    return np.asarray((beside == places).all(axis=-1).any(axis=(1, 2)))
+
+
+def seen_part(
+    places: NDArray[np.int32],
+    down: NDArray[np.int32],
+    whiteness: NDArray[np.float64],
+    motion: NDArray[np.integer],
+) -> SeenPart:
+    """A part in a frame of its own: cells at the places (P, 2) of the layout, down-cells (D, 2), their whiteness (D,)."""
+    axial = moved(places, motion, up=True)
+    # the class k of the frame is the class k + shift of the layout
+    shift = (places[0] - axial[0]) @ [1, -1] % 3
     naming = np.where(np.arange(3) == shift, 0.0, -NAMING_LEAD)
-    fields = InkFields(np.zeros((3, 3)), np.zeros((0, 3)), down, whiteness, whiteness > LIMITS.bright, 1.0)
+    frame = moved(down, motion, up=False)
+    fields = InkFields(np.zeros((3, 3)), np.zeros((0, 3)), frame, whiteness, whiteness > LIMITS.bright, 1.0)
     cells = WalkedCells(
         center_px=np.zeros((len(axial), 2)),
         corner_px=np.zeros((len(axial), 3, 2)),
@@ -107,25 +113,38 @@ def abused_part(pad: Pad, rng: np.random.Generator) -> tuple[SeenPart, NDArray[n
         first=np.zeros(len(axial), np.int8),
         part=np.zeros(len(axial), np.int32),
     )
-    return SeenPart(0, cells, fields, False, naming), places, int(np.isfinite(whiteness).sum())
+    return SeenPart(0, cells, fields, False, naming)
+
+
+def is_right(placed: PlacedPart, places: NDArray[np.int32]) -> bool:
+    """Whether the best motion carries the part's cells to the places (P, 2)."""
+    return np.array_equal(moved(placed.seen.cells.axial, placed.motions.motion[0], up=True), places)
+
+
+def random_motion(rng: np.random.Generator) -> NDArray[np.int64]:
+    return rng.integers((0, -40, -40), (3, 41, 41))
 
 
 def judged(pads: list[Pad], rng: np.random.Generator) -> tuple[str, str, float]:
     """One part: its group, the verdict, and the milliseconds; a third of the parts is of another pad."""
     code, other = rng.choice(len(pads), 2, replace=False)
     is_own = rng.random() < 2 / 3
-    seen, places, bits = abused_part(pads[code], rng)
+    pad = pads[code]
+    places = pad.lattice.axial[chosen_part(pad.lattice.axial @ LATTICE_STEPS, rng)]
+    near = down_cells_of(pad, places)
+    whiteness = abused_whiteness(pad.is_white[near], pad.down[near] @ LATTICE_STEPS, rng)
+    bits = int(np.isfinite(whiteness).sum())
     group = next((name for name, (low, high) in GROUPS.items() if low <= bits < high), "")
-    if not group or len(places) == 0:
+    if not group:
         return "", "", 0.0
+    seen = seen_part(places, pad.down[near], whiteness, random_motion(rng))
     group += "" if is_own else ", other pad"
     start = time.perf_counter()
     placed = pads[code if is_own else other].registration.register(seen, NO_BRIGHT_PLACES)
     spent_ms = 1e3 * (time.perf_counter() - start)
     if not placed.is_certain:
         return group, "refused", spent_ms
-    is_right = is_own and np.array_equal(moved(seen.cells.axial, placed.motions.motion[0], up=True), places)
-    return group, "right" if is_right else "wrong", spent_ms
+    return group, "right" if is_own and is_right(placed, places) else "wrong", spent_ms
 
 
 def measured(layers: int, parts: int, seed: int) -> tuple[dict[str, Counter[str]], float]:
