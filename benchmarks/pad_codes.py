@@ -99,7 +99,7 @@ def seen_part(
     whiteness: NDArray[np.float64],
     motion: NDArray[np.integer],
 ) -> SeenPart:
-    """A part in a frame of its own: cells at the places (P, 2) of the layout, down-cells (D, 2), their whiteness (D,)."""
+    """A part in a frame of its own: cells (P, 2), down-cells (D, 2), and the whiteness (D,) of these."""
     axial = moved(places, motion, up=True)
     # the class k of the frame is the class k + shift of the layout
     shift = (places[0] - axial[0]) @ [1, -1] % 3
@@ -167,7 +167,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=5)
     options = parser.parse_args()
     counts, median_ms = measured(options.layers, options.parts, options.seed)
-    print(f"{options.layers} layers, {options.parts} parts, seed {options.seed}; median {median_ms:.2f} ms a part")
+    print(
+        f"{options.layers} layers, {options.parts} parts, seed {options.seed}; median {median_ms:.2f} ms a part"
+    )
     for group in sorted(counts):
         found = counts[group]
         print(

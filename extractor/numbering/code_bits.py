@@ -27,8 +27,8 @@ class CodeLimits(NamedTuple):
         cells_beside: of the part, at the sides of a place, with fewer of which the place may be hidden. Chosen.
         min_bits: known bits, with fewer of which a code is not known. Derived: three quarters of the smallest window.
         max_misfit: share of the known bits that are wrong. Measured: ``python -m benchmarks.pad_codes``.
-        lead_bits, lead_share: the least number of bits, and the share of the known bits, that the second best motion has
-            wrong in addition. Measured: the same command.
+        lead_bits, lead_share: the least number of bits, and the share of the known bits, that the second best motion
+            has wrong in addition. Measured: the same command.
     """
 
     wrong_bit: float = 3.0

@@ -1,9 +1,9 @@
 """Stage 7: registers connected parts of cells with the layout.
 
 What is unknown of a part is a motion: one of three turns, and a shift. All motions are scored by all witnesses: cells
-outside the layout, the naming of the inks, and the white cell's place, or all white cells of a code. The part's motion is accepted if its lead
-over the second best is large. All other parts, a single cell being the smallest, are then registered against
-the placed ones by a smooth local map and their inks. A cell without a certain place has no number.
+outside the layout, the naming of the inks, and the white cell's place, or the bits of a code. The part's motion is
+accepted if its lead over the second best is large. All other parts, a single cell being the smallest, are then
+registered against the placed ones by a smooth local map and their inks. A cell without a certain place has no number.
 """
 
 from __future__ import annotations
@@ -362,15 +362,19 @@ class Registration:
         fields = seen.fields
         axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
         bits = CodeBits.of(fields, axial) if self._is_coded else None
-        white, limits = (bright.white_odds(fields), WITNESSES) if bits is None else (bits.odds, CODE_WITNESSES)
+        white, limits = (
+            (bright.white_odds(fields), WITNESSES) if bits is None else (bits.odds, CODE_WITNESSES)
+        )
         found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, limits)
         motions = Motions(*found)
         white_axial = fields.down_axial[fields.is_triangle]
         return PlacedPart(seen, motions, white_axial, self._other_whites(white_axial, motions), bits)
 
     def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
-        """The number of white triangles (W, 2) that the best motion carries to black cells of the layout; none of a coded
-        layout, where each is a wrong bit."""
+        """The number of white triangles (W, 2) that the best motion carries to black cells of the layout.
+
+        None of a coded layout, where each is a wrong bit.
+        """
         if len(motions.score) == 0 or self._is_coded:
             return 0
         turn, dq, dr = (int(v) for v in motions.motion[0])

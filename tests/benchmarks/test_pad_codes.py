@@ -30,7 +30,9 @@ def require_every_window_placed(pad: Pad, radius: int) -> None:
     for center in centers:
         step = pad.down - center
         corners = step[:, None] + np.array([[0, 0], [0, 1], [-1, 1]])
-        inside = (np.abs(corners).max(axis=(1, 2)) <= radius) & (np.abs(corners.sum(axis=2)).max(axis=1) <= radius)
+        inside = (np.abs(corners).max(axis=(1, 2)) <= radius) & (
+            np.abs(corners.sum(axis=2)).max(axis=1) <= radius
+        )
         beside = (pad.down[inside][:, None] + STEPS_BESIDE).reshape(-1, 2)
         places = axial[(axial[:, None] == beside).all(axis=2).any(axis=1)]
         near = down_cells_of(pad, places) & inside
