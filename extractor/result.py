@@ -35,6 +35,7 @@ class Origin(StrEnum):
     """The evidence that fixed the start of the numbering."""
 
     WHITE = "white"  # the white cell
+    CODE = "code"  # the white cells of a coded pad
     OUTLINE = "outline"  # the pattern's rim, because the white cell is hidden
     PREVIOUS = "previous"  # the previous frame, because the white cell is hidden
 
@@ -47,6 +48,7 @@ class Reason(StrEnum):
     REFERENCE_LOST = "reference_lost"  # a pattern whose white cell is not visible
     AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
     SEVERAL_PADS = "several_pads"  # several white cells, each with the surrounding cells of a pattern
+    OTHER_CODE = "other_code"  # white cells that are not those of the layout's code
     OTHER_SIDE = (
         "other_side"  # the other side, or red and blue are swapped: the inks do not distinguish the cases
     )
@@ -74,6 +76,8 @@ _REASON_TEXTS = {
     Reason.AMBIGUOUS: "the numbering is ambiguous: more than one cell could be the white cell; remove glare and dirt, "
     "and show the pattern around the white cell",
     Reason.SEVERAL_PADS: "several white cells agree with the cells around them; show one pad alone",
+    Reason.OTHER_CODE: "the white cells are not those of the layout's code; give the layout of this pad, or clean the "
+    "pattern and remove glare",
     Reason.OTHER_SIDE: "the pattern is seen from another side than stated: a mirrored camera, the pad's other "
     "face, or an RGB image where BGR is expected; state side or channels",
     Reason.MIRRORED: "the pattern is seen from another side than stated: by the colors of its inks a mirrored "

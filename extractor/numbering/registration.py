@@ -1,9 +1,9 @@
 """Stage 7: registers connected parts of cells with the layout.
 
 What is unknown of a part is a motion: one of three turns, and a shift. All motions are scored by all witnesses: cells
-outside the layout, the naming of the inks, and the white cell's place. The part's motion is accepted if its lead
-over the second best is large. All other parts, a single cell being the smallest, are then registered against
-the placed ones by a smooth local map and their inks. A cell without a certain place has no number.
+outside the layout, the naming of the inks, and the white cell's place, or the bits of a code. The part's motion is
+accepted if its lead over the second best is large. All other parts, a single cell being the smallest, are then
+registered against the placed ones by a smooth local map and their inks. A cell without a certain place has no number.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
+from extractor.numbering.code_bits import CodeBits
 from extractor.numbering.ink_fields import LIMITS, InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.result import Origin, Reason
@@ -125,6 +126,7 @@ class AttachmentLimits(NamedTuple):
 
 
 WITNESSES = WitnessLimits()
+CODE_WITNESSES = WITNESSES._replace(max_motions=10_000)  # all: bits have no part in one of the leads
 WHITE = WhiteLimits()
 ATTACHMENT = AttachmentLimits()
 
@@ -134,10 +136,12 @@ class RegisteredLayout(NamedTuple):
 
     Attributes:
         axial: (U, 2) int32, of the colored cells.
+        white_axial: (W, 2) int32, of the white down-cells.
         cell_lookup: (S, S) int32, as ``Lattice.cell_lookup``.
     """
 
     axial: NDArray[np.int32]
+    white_axial: NDArray[np.int32]
     cell_lookup: NDArray[np.int32]
 
 
@@ -148,7 +152,7 @@ class Motions(NamedTuple):
         motion: (K, 3) int32, turn, and shifts of q and r.
         score: (K,) float64, log odds.
         inside: (K,) int64, number of cells in the layout.
-        white: (K,) float64, the log odds of the white place alone.
+        white: (K,) float64, the log odds of the white places alone.
     """
 
     motion: NDArray[np.int32]
@@ -167,6 +171,7 @@ class Numbering:
         origin: the evidence for the origin.
         lead: log odds of the motion of the first part over the second best.
         fields: the colors around the first part.
+        code_misfit: share of the known bits of a code that are wrong in the first part; 0 without a code.
     """
 
     cell: NDArray[np.int32]
@@ -174,6 +179,7 @@ class Numbering:
     origin: Origin
     lead: float
     fields: InkFields
+    code_misfit: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,23 +208,40 @@ class _WalkedImage(NamedTuple):
         return seen_from(self.cells, self.mesh, self.walk, mirrored)
 
 
-class _Seen(NamedTuple):
-    """A part with its colors."""
+class SeenPart(NamedTuple):
+    """A part with its colors.
+
+    Attributes:
+        part: its number.
+        cells: the cells of the image.
+        fields: the colors around the part.
+        mirrored: the part is seen from its back.
+        naming: (3,) float64, log odds of the namings.
+    """
 
     part: int
     cells: WalkedCells
     fields: InkFields
     mirrored: bool
-    naming: NDArray[np.float64]  # (3,) log odds of the namings
+    naming: NDArray[np.float64]
 
 
-class _Placed(NamedTuple):
-    """A part with its motions."""
+class PlacedPart(NamedTuple):
+    """A part with its motions.
 
-    seen: _Seen
+    Attributes:
+        seen: the part.
+        motions: the motions.
+        white_axial: (W, 2) int32, of the white triangles.
+        other_whites: number of these at black cells of a layout without a code, by the best motion.
+        bits: of a coded layout.
+    """
+
+    seen: SeenPart
     motions: Motions
-    white_axial: NDArray[np.int32]  # (W, 2) of the white triangles
-    other_whites: int  # of these, at black cells of the layout by the best motion
+    white_axial: NDArray[np.int32]
+    other_whites: int
+    bits: CodeBits | None
 
     @property
     def lead(self) -> float:
@@ -238,7 +261,24 @@ class _Placed(NamedTuple):
 
     @property
     def is_certain(self) -> bool:
-        return len(self.motions.score) > 0 and self.lead >= LEAD
+        if len(self.motions.score) == 0 or self.lead < LEAD or not self.is_code:
+            return False
+        return self.bits is None or self.is_proved_by_bits or self.lead_without_bits >= LEAD
+
+    @property
+    def is_code(self) -> bool:
+        """Whether the best motion shows the code of the layout, if it has one."""
+        return self.bits is None or self.bits.is_code(float(self.motions.white[0]))
+
+    @property
+    def is_proved_by_bits(self) -> bool:
+        return self.bits is not None and self.lead >= self.bits.min_lead
+
+    @property
+    def lead_without_bits(self) -> float:
+        """Log odds of the best motion over the others by all witnesses but the bits."""
+        scores = self.motions.score - self.motions.white
+        return float(scores[0] - scores[1:].max(initial=-np.inf))
 
 
 class Registration:
@@ -254,7 +294,8 @@ class Registration:
         self._lattice = lattice
         self._palette = palette
         self._mirrored = mirrored
-        self._layout = RegisteredLayout(lattice.axial, lattice.cell_lookup)
+        self._layout = RegisteredLayout(lattice.axial, lattice.white_axial, lattice.cell_lookup)
+        self._is_coded = len(lattice.white_axial) > 1
         self.min_cells = max(MIN_LAYOUT_SHARE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
 
     def number(
@@ -272,9 +313,9 @@ class Registration:
             return Refusal(Reason.NO_PATTERN)
         image = _WalkedImage(view, cells, mesh, light, walk)
         seen = [self._see(image, part) for part in large]
-        bright = BrightPlaces.of([one.fields.whiteness for one in seen if isinstance(one, _Seen)])
-        found = [self._register(one, bright) if isinstance(one, _Seen) else one for one in seen]
-        placed = [one for one in found if isinstance(one, _Placed)]
+        bright = BrightPlaces.of([one.fields.whiteness for one in seen if isinstance(one, SeenPart)])
+        found = [self.register(one, bright) if isinstance(one, SeenPart) else one for one in seen]
+        placed = [one for one in found if isinstance(one, PlacedPart)]
         certain = [one for one in placed if one.is_certain]
         if placed and not certain:
             fewest = min(placed, key=lambda one: len(one.tied) or MAX_TIED)
@@ -289,7 +330,7 @@ class Registration:
             else Refusal(_uncertain_reason(found[0]), found[0].seen.fields)
         )
 
-    def _see(self, image: _WalkedImage, part: int) -> _Seen | Refusal:
+    def _see(self, image: _WalkedImage, part: int) -> SeenPart | Refusal:
         """The colors of a part, or the reason why its side is refused."""
         mirrored = bool(self._mirrored)
         walked = image.seen_from(mirrored)
@@ -311,24 +352,30 @@ class Registration:
         naming = NAMING_WEIGHT * (own - own.max())
         # where all classes look alike it is the tiling of another pattern, or the light shows no ink
         return (
-            _Seen(part, walked, fields, mirrored, naming)
+            SeenPart(part, walked, fields, mirrored, naming)
             if naming.min() < -LEAD
             else Refusal(Reason.NO_PATTERN, fields)
         )
 
-    def _register(self, seen: _Seen, bright: BrightPlaces) -> _Placed:
+    def register(self, seen: SeenPart, bright: BrightPlaces) -> PlacedPart:
         """A part with its motions."""
         fields = seen.fields
         axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
-        white = bright.white_odds(fields)
-        found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, WITNESSES)
+        bits = CodeBits.of(fields, axial) if self._is_coded else None
+        white, limits = (
+            (bright.white_odds(fields), WITNESSES) if bits is None else (bits.odds, CODE_WITNESSES)
+        )
+        found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, limits)
         motions = Motions(*found)
         white_axial = fields.down_axial[fields.is_triangle]
-        return _Placed(seen, motions, white_axial, self._other_whites(white_axial, motions))
+        return PlacedPart(seen, motions, white_axial, self._other_whites(white_axial, motions), bits)
 
     def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
-        """The number of white triangles (W, 2) that the best motion carries to black cells of the layout."""
-        if len(motions.score) == 0:
+        """The number of white triangles (W, 2) that the best motion carries to black cells of the layout.
+
+        None of a coded layout, where each is a wrong bit.
+        """
+        if len(motions.score) == 0 or self._is_coded:
             return 0
         turn, dq, dr = (int(v) for v in motions.motion[0])
         count = 0
@@ -340,7 +387,7 @@ class Registration:
             count += (q, r) != (0, 0) and bool((beside >= 0).all())
         return count
 
-    def _with_all_parts(self, placed: _Placed, count: int) -> list[_Placed]:
+    def _with_all_parts(self, placed: PlacedPart, count: int) -> list[PlacedPart]:
         """The part with a certain motion, if the other parts decide between its best motions; else nothing.
 
         Under each motion the other parts are registered; a cell without a place counts as one outside the layout.
@@ -358,10 +405,10 @@ class Registration:
         motions = placed.motions
         chosen = Motions(motions.motion[order], score[order], motions.inside[order], motions.white[order])
         decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
-        return [decided] if decided.lead >= JOINT_LEAD else []
+        return [decided] if decided.lead >= JOINT_LEAD and decided.is_code else []
 
     def _placed_cells(
-        self, placed: _Placed, number: int, limits: AttachmentLimits = ATTACHMENT
+        self, placed: PlacedPart, number: int, limits: AttachmentLimits = ATTACHMENT
     ) -> NDArray[np.int32]:
         """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
         seen = placed.seen
@@ -372,11 +419,19 @@ class Registration:
         cell[own] = native.moved_cells(axial, turn, dq, dr, self._layout.cell_lookup)
         shift = _class_shift(self._lattice, cell[own], axial)
         odds = np.ascontiguousarray(seen.fields.odds[:, (np.arange(3) - shift) % 3])
-        cell = native.attach_parts(seen.cells, cell, odds, self._lattice.layout_cells, *self._layout, limits)
+        cell = native.attach_parts(
+            seen.cells,
+            cell,
+            odds,
+            self._lattice.layout_cells,
+            self._layout.axial,
+            self._layout.cell_lookup,
+            limits,
+        )
         odd = is_odd(odds, self._lattice.ink[np.maximum(cell, 0)].astype(np.intp) - 1)
         return np.where(odd, -1, cell).astype(np.int32)
 
-    def _number_with(self, placed: _Placed, parts: list[_Placed]) -> Numbering | Refusal | None:
+    def _number_with(self, placed: PlacedPart, parts: list[PlacedPart]) -> Numbering | Refusal | None:
         """The numbers of all cells by the part whose motion is certain; none if the other parts contradict the
         motion."""
         cell = self._placed_cells(placed, 0)
@@ -390,8 +445,15 @@ class Registration:
         others = [one for one, own in zip(parts, sizes, strict=True) if own[1] == 0]
         if any(one.is_certain and one.motions.white[0] > 0.0 for one in others):
             return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
-        origin = Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
-        return Numbering(cell, placed.seen.mirrored, origin, placed.lead, placed.seen.fields)
+        white = float(placed.motions.white[0])
+        misfit = 0.0 if placed.bits is None else placed.bits.misfit(white)
+        return Numbering(cell, placed.seen.mirrored, _origin(placed), placed.lead, placed.seen.fields, misfit)
+
+
+def _origin(placed: PlacedPart) -> Origin:
+    if placed.bits is not None:
+        return Origin.CODE if placed.is_proved_by_bits else Origin.OUTLINE
+    return Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
 
 
 def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bool_]:
@@ -437,8 +499,11 @@ class BrightPlaces(NamedTuple):
         return np.where(np.isfinite(whiteness), odds, np.nan)
 
 
-def _uncertain_reason(placed: _Placed) -> Reason:
+def _uncertain_reason(placed: PlacedPart) -> Reason:
     """Why a part has no certain motion."""
+    if placed.bits is not None:
+        known = len(placed.motions.score) > 0 and placed.bits.is_known
+        return Reason.OTHER_CODE if known and not placed.is_code else Reason.AMBIGUOUS
     white = placed.motions.white
     close = placed.tied
     whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites

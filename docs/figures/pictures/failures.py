@@ -21,28 +21,30 @@ from extractor import Reason, Reference, parse_layout
 Picture = NDArray[np.uint8]
 SIZE_PX = (320, 240)
 LAYERS = 6
+CODE_SHOWN, CODE_READ = 1, 2
 COVER = 90  # gray level of what lies on the pattern
 WHITE, BLACK = COLORS.index("white"), COLORS.index("black")
 
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """A picture (H, W, 3) uint8 BGR that gives a reason."""
+    """A picture (H, W, 3) uint8 BGR that gives a reason, and the layout with which it is read."""
 
     reason: Reason
     image: Picture
+    layout: Reference
 
 
 @cache
-def pattern() -> Layout:
-    """The layout with which the pictures are read."""
-    return build_layout(Design(pattern="honeycomb", layers=LAYERS, pitch_mm=1.5))
+def pattern(code: int = 0) -> Layout:
+    """The layout with which the pictures are read; with a code, for the picture of another code."""
+    return build_layout(Design(pattern="honeycomb", layers=LAYERS, pitch_mm=1.5, code=code))
 
 
 @cache
-def pattern_reference() -> Reference:
+def pattern_reference(code: int = 0) -> Reference:
     """The same as the reader has it."""
-    return parse_layout(layout_to_json(pattern()))
+    return parse_layout(layout_to_json(pattern(code)))
 
 
 def figures() -> dict[str, bytes]:
@@ -62,12 +64,16 @@ def failures() -> tuple[Failure, ...]:
         Reason.REFERENCE_LOST: covered_center,
         Reason.AMBIGUOUS: two_bright_drops,
         Reason.SEVERAL_PADS: two_pads,
+        Reason.OTHER_CODE: another_code,
         Reason.OTHER_SIDE: other_side_in_other_inks,
         Reason.MIRRORED: mirrored,
         Reason.SWAPPED_CHANNELS: swapped,
         Reason.FEW_MARKERS: mostly_covered,
     }
-    return tuple(Failure(reason, makers[reason]()) for reason in Reason)
+    read = {Reason.OTHER_CODE: pattern_reference(CODE_READ)}
+    return tuple(
+        Failure(reason, makers[reason](), read.get(reason, pattern_reference())) for reason in Reason
+    )
 
 
 def view(layout: Layout | None = None, pitch_px: float = 15.0, **changes: object) -> Picture:
@@ -113,6 +119,10 @@ def two_bright_drops() -> Picture:
 
 def two_pads() -> Picture:
     return np.hstack([view(pitch_px=11.0)[:, 80:240]] * 2)
+
+
+def another_code() -> Picture:
+    return view(pattern(CODE_SHOWN))
 
 
 def mirrored() -> Picture:

@@ -31,7 +31,7 @@ struct ScoredMotion {
   double white;
 };
 
-// The log odds of the white place by axial place.
+// The log odds of white over black by axial place.
 class WhitePlaces {
  public:
   WhitePlaces(View<const std::int32_t, 2> axial, View<const double, 1> odds) : odds_(odds) {
@@ -91,7 +91,9 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
         const std::int64_t inside = count_inside(turned, dq, dr, most, layout.cell_lookup);
         if (inside < 0) continue;
         const Motion motion{turn, dq, dr};
-        const double odds = whites.at(moved_back_down({0, 0}, motion));  // the down-cell (0, 0) is white
+        double odds = 0.0;
+        for (Index w = 0; w < layout.white_axial.size(); ++w)
+          odds += whites.at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
         const double outside = static_cast<double>(axial.size() - inside);
         found.push_back(

@@ -25,16 +25,17 @@ struct WitnessLimits {
 // The layout as registration sees it.
 struct RegisteredLayout {
   View<const std::int32_t, 2> axial;        // (U, 2) of the colored cells
+  View<const std::int32_t, 2> white_axial;  // (W, 2) of the white down-cells
   View<const std::int32_t, 2> cell_lookup;  // (S, S), as Lattice.cell_lookup
 
   template <class F>
   static RegisteredLayout read(const F& f) {
-    return {f["axial"], f["cell_lookup"]};
+    return {f["axial"], f["white_axial"], f["cell_lookup"]};
   }
 };
 
 // The K best motions, the best first: (K, 3) turn, dq and dr; scores (K,), log odds; inside (K,), how many
-// cells lie in the layout; white (K,), the log odds of the white place alone.
+// cells lie in the layout; white (K,), the log odds of the white places alone.
 using Motions =
     std::tuple<Array<std::int32_t, 2>, Array<double, 1>, Array<std::int64_t, 1>, Array<double, 1>>;
 
