@@ -11,7 +11,18 @@ import typer
 
 from cmpdesign import __version__
 from cmpdesign.cli.command import Command, OneLineErrors, examples, exit_interrupted
-from cmpdesign.cli.commands import build, check, evaluate, kerf, reconstruct, render, size, track, verify
+from cmpdesign.cli.commands import (
+    build,
+    cameras,
+    check,
+    evaluate,
+    kerf,
+    reconstruct,
+    render,
+    size,
+    track,
+    verify,
+)
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
@@ -38,6 +49,7 @@ for module, function in (
     (check, check.check),
     (render, render.render),
     (verify, verify.verify),
+    (cameras, cameras.cameras),
     (track, track.track),
     (reconstruct, reconstruct.reconstruct),
     (dataset, dataset.dataset),

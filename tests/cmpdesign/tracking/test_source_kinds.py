@@ -17,7 +17,7 @@ from PIL import Image as PillowImage
 from cmpdesign.data.videos.pieces import piece_frames, video_pieces
 from cmpdesign.files.images import read_image
 from cmpdesign.inputs.sources import name_sources
-from cmpdesign.tracking.sources import SourceError, open_named, open_source, open_sources
+from cmpdesign.tracking.sources import Reading, SourceError, open_named, open_source, open_sources
 from tests.support.command import refused, run
 from tests.support.made.videos import cut_jpeg, cut_without_encoding, turn_in_player, write_video
 from tests.support.tracking.files import loaded, write_moving_pattern
@@ -38,7 +38,7 @@ def images(made: Path) -> list[Any]:
 
 
 def times_of(source: Any, **options: Any) -> list[float]:
-    return [round(frame.time_s, 6) for frame in open_source(source, **options).frames()]
+    return [round(frame.time_s, 6) for frame in open_source(source, Reading(**options)).frames()]
 
 
 def shown(path: Path) -> list[Any]:
