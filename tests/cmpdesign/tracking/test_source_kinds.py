@@ -188,6 +188,28 @@ def test_fewer_bits_in_a_file_of_16(bits: int, at_top: bool, images: list[Any], 
     assert np.abs(found - expected).max() <= 1
 
 
+def test_bits_are_found_from_all_pictures_or_stated(made: Path, images: list[Any], tmp_path: Path) -> None:
+    """A dark picture alone looks like one of fewer bits; its light stays comparable to that of the others."""
+    for k, share in enumerate((1.0, 0.1)):
+        wide = (images[0].astype(np.float64) / 255 * share * 4095).round().astype(np.uint16)
+        wide[0, 0] = 4095 * share
+        cv2.imwrite(str(tmp_path / f"{k}.png"), wide)
+    source = open_source(str(tmp_path))
+    bright, dark = (frame.image for frame in source.frames())
+    assert np.median(bright / np.maximum(dark, 1)) == pytest.approx(10, rel=0.02)
+    assert "values of 12 bits in 16" in source.notes[0]
+    alone = next(iter(open_source(str(tmp_path / "1.png"), Reading(bits=12)).frames())).image
+    assert (alone == dark).all()
+    frame = next(iter(open_source(str(tmp_path / "0.png"), Reading(bits=10)).frames()))
+    assert frame.image is None and "have 12 bits, bits states 10" in frame.problem
+    result = run("track", made / "layout.json", tmp_path, "-o", tmp_path / "a.npz")
+    assert result.exit_code == 0 and result.stderr.count("values of 12 bits in 16") == 1
+    assert json.loads((tmp_path / "a.npz.summary.json").read_text())["notes"]
+    assert "--bits is 17; expected 8 to 16" in refused(
+        "track", made / "layout.json", tmp_path, "-o", tmp_path / "b.npz", "--bits", 17
+    )
+
+
 def test_a_folder_with_other_files(images: list[Any], tmp_path: Path) -> None:
     for k in range(6):
         cv2.imwrite(str(tmp_path / f"frame{k}.png"), images[k])
