@@ -83,7 +83,9 @@ def load_layout(path: str | PathLike[str]) -> Reference:
         LayoutError: the file cannot be read, is of another format or version, or contradicts itself; one line
             that names the file, the field, the value and what is expected.
     """
-    text = read_text_file(path, MAX_BYTES, LayoutError, "a layout, a text in UTF-8; it comes first, then the pictures")
+    text = read_text_file(
+        path, MAX_BYTES, LayoutError, "a layout, a text in UTF-8; it comes first, then the pictures"
+    )
     return parse_layout(text, printable_path(path))
 
 

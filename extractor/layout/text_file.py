@@ -75,7 +75,9 @@ def read_bytes_file(
             kind = _KINDS.get(stat.S_IFMT(found.st_mode), "a device")
             raise error(f"{name}: cannot be read: it is {kind}; expected {expected}")
         with os.fdopen(descriptor, "rb", closefd=False) as file:
-            data = file.read(min(found.st_size, most_bytes) + 1)  # ``read`` allocates the requested number of bytes
+            data = file.read(
+                min(found.st_size, most_bytes) + 1
+            )  # ``read`` allocates the requested number of bytes
     except OSError as problem:
         raise error(f"{name}: cannot be read: {problem.strerror}") from None
     finally:
