@@ -90,7 +90,7 @@ def test_ctrl_c_is_one_line(name: tuple[str, ...], monkeypatch: pytest.MonkeyPat
 
 IMPORTING = """
 import builtins, sys
-from cmpdesign.cli import main
+from cmpdesign.__main__ import main
 left, usual = int(sys.argv.pop(1)), builtins.__import__
 def importing(*words, **options):
     global left
