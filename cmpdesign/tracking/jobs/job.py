@@ -308,12 +308,13 @@ def write_summary(run: TrackingRun, job: Job[Summary]) -> Summary:
         summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
     # Tables of several formats in one folder have a summary each.
     place = job.output.with_name(job.output.name + ".summary.json")
+    document = job.document(summary)  # its schema is that of the file
     contents: dict[Path, str | bytes] = {place: json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
     contents |= job.pictures(run)
     for path, content in contents.items():
         write_file(path, content)
     written = (job.output, *contents, *([] if job.overlay is None else [job.overlay]))
-    return job.document({**summary, "written": tuple(visible(str(path)) for path in written)})
+    return document.model_copy(update={"written": tuple(visible(str(path)) for path in written)})
 
 
 def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuation:
