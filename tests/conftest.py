@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+
+# Before numpy is imported: threads of two workers would wait for each other with busy processors.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 

@@ -210,7 +210,6 @@ def unfinished_shard(folder: Path, number: int) -> Iterator[Stage]:
     """
     parent = folder / UNFINISHED / shard_name(number)
     try:
-        parent.mkdir(parents=True, exist_ok=True)
         with Stage(parent) as stage:
             yield stage
     except OutputError:

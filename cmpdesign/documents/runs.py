@@ -175,6 +175,22 @@ class PositionsPart(Part):
     continued_to_surface: bool
 
 
+class PressPart(Part):
+    """The frame with the largest press."""
+
+    frame: int
+    force_n: tuple[float, float, float]
+    force_sigma_n: tuple[float, float, float] = Field(description="Standard deviations.")
+    regions: int
+
+
+class ContactPart(Part):
+    """The contacts of a run."""
+
+    reasons: dict[str, int] = Field(description="Reasons of contacts -> number of frames.")
+    largest: PressPart | None
+
+
 class ReconstructDocument(Document):
     """The summary of ``reconstruct``; also the file FILE.summary.json."""
 
@@ -199,6 +215,7 @@ class ReconstructDocument(Document):
     model_px: float
     warnings: tuple[str, ...]
     positions: PositionsPart
+    contact: ContactPart | None = Field(None, description="With --contact.")
     largest_displacement: LargestPart | None
     times: TimesPart
     notes: tuple[str, ...] = Field((), description="What a user should know about the source.")

@@ -31,7 +31,7 @@ class Stage:
         folder: the folder.
 
     Args:
-        parent: folder of the files to come; it exists.
+        parent: folder of the files to come, made if missing.
 
     Raises:
         OSError: the folder cannot be made.
@@ -40,15 +40,13 @@ class Stage:
     def __init__(self, parent: Path) -> None:
         remove_abandoned_stages(parent)
         while True:
-            self.folder = Path(tempfile.mkdtemp(prefix=STAGE_PREFIX, dir=parent))
+            self.folder = _new_folder(parent)
             self._descriptor = open_for_lock(self.folder)
-            if self._descriptor is None:
+            is_taken = self._descriptor is not None and try_lock(self._descriptor) is Lock.TAKEN
+            # Before this lock, another process may have taken the folder for abandoned, and removes the folder.
+            if not is_taken and self.folder.exists():
                 return
-            try_lock(self._descriptor)
-            # Before the lock, another process may have taken the folder for abandoned.
-            if self.folder.exists():
-                return
-            os.close(self._descriptor)
+            self.close()
 
     def commit(self, staged: Path, path: Path) -> None:
         """Flush a staged file or folder to disk, and rename it to its place.
@@ -78,6 +76,19 @@ class Stage:
         self.close()
 
 
+def _new_folder(parent: Path) -> Path:
+    """A new folder in ``parent``, which another process may remove while it is empty."""
+    for _ in range(REMOVALS):
+        with suppress(FileNotFoundError, FileExistsError):
+            return _new_folder_at_once(parent)
+    return _new_folder_at_once(parent)
+
+
+def _new_folder_at_once(parent: Path) -> Path:
+    parent.mkdir(parents=True, exist_ok=True)
+    return Path(tempfile.mkdtemp(prefix=STAGE_PREFIX, dir=parent))
+
+
 def remove_abandoned_stages(parent: Path) -> None:
     """Remove the stages of killed processes from a folder: stages of this user that no process has locked."""
     for path in _stages_in(parent):
@@ -85,7 +96,7 @@ def remove_abandoned_stages(parent: Path) -> None:
         if descriptor is None:
             continue
         try:
-            if try_lock(descriptor) is Lock.HELD and _is_own(descriptor):
+            if _is_own(descriptor) and try_lock(descriptor) is Lock.HELD:
                 shutil.rmtree(path, ignore_errors=True)
         finally:
             os.close(descriptor)
@@ -115,9 +126,10 @@ def staged_file(path: str | Path) -> Iterator[Path]:
     An error within the block leaves the file at ``path`` unchanged, and no other file.
 
     Raises:
-        OSError: the file cannot be written.
+        OSError: the file cannot be written; its folder is missing.
     """
     path = Path(path)
+    path.parent.stat()
     _require_no_folder(path)
     with Stage(path.parent) as stage:
         staged = stage.folder / f"staged{path.suffix}"
@@ -133,9 +145,11 @@ def write_file(path: str | Path, content: str | bytes) -> None:
     """
     path = Path(path)
     with _as_output_error(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with staged_file(path) as staged:
+        _require_no_folder(path)
+        with Stage(path.parent) as stage:
+            staged = stage.folder / "staged"
             staged.write_bytes(_to_bytes(content))
+            stage.commit(staged, path)
 
 
 def write_new_file(path: str | Path, content: str | bytes) -> bool:
@@ -145,21 +159,19 @@ def write_new_file(path: str | Path, content: str | bytes) -> bool:
         OutputError: the file cannot be written.
     """
     path = Path(path)
-    with _as_output_error(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with Stage(path.parent) as stage:
-            staged = stage.folder / "staged"
-            staged.write_bytes(_to_bytes(content))
-            sync_file(staged)
-            try:
-                os.link(staged, path)
-            except FileExistsError:
+    with _as_output_error(path), Stage(path.parent) as stage:
+        staged = stage.folder / "staged"
+        staged.write_bytes(_to_bytes(content))
+        sync_file(staged)
+        try:
+            os.link(staged, path)
+        except FileExistsError:
+            return False
+        except OSError:  # a file system without a second name of a file
+            if path.exists():
                 return False
-            except OSError:  # a file system without a second name of a file
-                if path.exists():
-                    return False
-                staged.rename(path)
-            sync_folder(path.parent)
+            staged.rename(path)
+        sync_folder(path.parent)
     return True
 
 
@@ -179,7 +191,6 @@ def write_folder(folder: str | Path, files: Mapping[str, str | bytes]) -> list[P
     folder = Path(folder)
     paths = [folder / name for name in files]
     with _as_output_error(folder):
-        folder.mkdir(parents=True, exist_ok=True)
         for path in paths:
             _require_no_folder(path)
         with Stage(folder) as stage:

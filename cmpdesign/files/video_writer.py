@@ -42,7 +42,6 @@ class VideoWriter:
         import cv2
 
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
             self._stage = Stage(self._path.parent)
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written ({error.strerror or error})") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cmpdesign.contact.elastomer import Elastomer
 from cmpdesign.errors import CmpDesignError, parameter
@@ -52,25 +52,40 @@ def read_elastomer(path: Path) -> Elastomer:
     return Elastomer(lengths["thickness_mm"], 1.0, float(poisson), lengths["marker_depth_mm"])
 
 
-def read_young_mpa(path: Path) -> tuple[float, float]:
-    """Young's modulus of the same table and its deviation ``young_sigma_mpa`` (0 if not given), MPa.
+class ForceConstants(NamedTuple):
+    """What forces need of an elastomer beside its Green's matrix.
+
+    Attributes:
+        young_mpa, young_sigma_mpa: Young's modulus and its deviation; 0 if not given.
+        friction: coefficient of friction; None if not given.
+    """
+
+    young_mpa: float
+    young_sigma_mpa: float
+    friction: float | None
+
+
+def read_force_constants(path: Path) -> ForceConstants:
+    """``young_mpa``, ``young_sigma_mpa`` and ``friction`` of the same table.
 
     Raises:
         InputError: the file cannot be read, or is no TOML.
         CmpDesignError: the modulus is missing, or a value is no number above 0.
     """
     table = _read_table(path) or {}
-    found = []
-    for name, default in (("young_mpa", None), ("young_sigma_mpa", 0.0)):
-        value = table.get(name, default)
+    found: dict[str, float] = {}
+    for name in ("young_mpa", "young_sigma_mpa", "friction"):
+        if name not in table and name != "young_mpa":
+            continue
+        value = table.get(name)
         good = isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < float("inf")
-        if not good or (value == 0 and default is None):
+        if not isinstance(value, int | float) or not good or (value == 0 and name != "young_sigma_mpa"):
             raise CmpDesignError(
-                f"{path}: elastomer.{name} is {value!r}; forces need Young's modulus above 0 MPa, as "
-                "`cmpdesign calibrate force` measures it"
+                f"{path}: elastomer.{name} is {value!r}; forces need numbers above 0, and Young's modulus in MPa, "
+                "as `cmpdesign calibrate force` measures it"
             )
-        found.append(float(value))
-    return found[0], found[1]
+        found[name] = float(value)
+    return ForceConstants(found["young_mpa"], found.get("young_sigma_mpa", 0.0), found.get("friction"))
 
 
 def _length_mm(path: Path, name: str, value: object) -> float:

@@ -9,17 +9,15 @@ import numpy as np
 
 from cmpdesign.tracking.columns import (
     COVARIANCE,
-    FORCE_DIGITS,
     UPPER,
     Columns,
     by_point,
-    force_columns,
-    force_long_form,
     head_columns,
     long_head_columns,
     time_columns,
     unknown_times,
 )
+from cmpdesign.tracking.force_table import FORCE_DIGITS, force_about, force_columns, force_long_form
 from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 if TYPE_CHECKING:
@@ -44,7 +42,7 @@ class ShapeTable:
         continuation: continues the markers' displacements to the touched surface, for further columns; None: not
             wanted.
         times: gives how the frames' times were found, for the shared columns.
-        contact: reads force, torque and traction, for further columns; None: not wanted.
+        contact: the reader whose forces the frames hold, for further columns; None: frames without forces.
     """
 
     _digits: Mapping[str, int] = (
@@ -90,7 +88,7 @@ class ShapeTable:
             columns["surface_displacement_mm"] = moved.astype(np.float32)
             columns["surface_cov_mm2"] = spread.astype(np.float32)
         if self._contact is not None:
-            columns |= force_columns([self._contact.read_shape(s) for s in shapes])
+            columns |= force_columns([frame.contact for frame in frames if frame.contact is not None])
         return columns
 
     def about(self) -> Columns:
@@ -115,7 +113,7 @@ class ShapeTable:
             "pose_misfit": np.array(poses.misfit),
             "model_px": np.array(reconstructor.model_px),
             **time_columns(self._times()),
-            **({} if self._contact is None else {"young_mpa": np.array(self._contact.young_mpa)}),
+            **({} if self._contact is None else force_about(self._contact)),
         }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,18 @@ from extractor.contact.regions import Patch, find_patches
 from extractor.contact.result import ContactForce, ContactReason, Region
 from extractor.errors import GelError
 from extractor.layout.layout_file import LayoutLike, layout_of
-from extractor.space.reconstruction import Shape
 
 Array = NDArray[np.float64]
+
+
+class Displaced(Protocol):
+    """Displacements (M, 3) mm with covariances (M, 3, 3) mm^2, as of a ``Shape``."""
+
+    @property
+    def displacement_mm(self) -> Array: ...
+
+    @property
+    def displacement_cov_mm2(self) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -104,7 +114,7 @@ class ContactReader:
         """Forget the frame before."""
         self._support = None
 
-    def read_shape(self, shape: Shape) -> ContactForce:
+    def read_shape(self, shape: Displaced) -> ContactForce:
         """The contact of a reconstructed surface."""
         return self.read(shape.displacement_mm, shape.displacement_cov_mm2)
 
@@ -222,8 +232,9 @@ class ContactReader:
         by_load = (at - centre) * (self.gel.area_mm2[support[patch.members]] / press.sum())[:, None]
         cov = by_load.T @ noise[np.ix_(rows, rows)] @ by_load + self.model.centre_error_mm**2 * np.eye(2)
         return Region(
-            patch.area_mm2, patch.outline_mm, centre, cov, whole.force, whole.force_cov, whole.torque
-        )
+            patch.area_mm2, patch.outline_mm, centre, cov,
+            whole.force, whole.force_cov, whole.torque, whole.torque_cov,
+        )  # fmt: skip
 
     def _reason(self, whole: _Sum, patches: list[Patch], support: NDArray[np.intp]) -> ContactReason:
         if -whole.force[2] < LEAST_SIGMAS * np.sqrt(whole.force_cov[2, 2]):

@@ -47,7 +47,7 @@ class Region:
         centre_mm: (2,) centre of pressure.
         centre_cov_mm2: (2, 2).
         force_n, force_cov_n2: (3,) and (3, 3), as of the frame.
-        torque_nmm: (3,) about the frame's point.
+        torque_nmm, torque_cov_nmm2: (3,) and (3, 3), about the frame's point.
     """
 
     area_mm2: float
@@ -57,6 +57,7 @@ class Region:
     force_n: Array
     force_cov_n2: Array = field(repr=False)
     torque_nmm: Array
+    torque_cov_nmm2: Array = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)

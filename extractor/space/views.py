@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.contact import ContactForce, ContactReader
 from extractor.errors import ImageError
 from extractor.image.input import Channels
 from extractor.image.response import Response
@@ -130,7 +131,8 @@ class ShapeFrame:
         reason: why not, or the view without a pattern; empty when all views show the pattern.
         shape: the surface.
         views: the tracked frame of every view.
-        elapsed_ms: time from images to surface.
+        elapsed_ms: time from images to surface, and to the contact.
+        contact: force, torque and regions; None without a ``ContactReader``.
     """
 
     index: int
@@ -140,6 +142,7 @@ class ShapeFrame:
     shape: Shape
     views: tuple[Tracked, ...]
     elapsed_ms: float
+    contact: ContactForce | None = None
 
 
 class ShapeTracker:
@@ -151,6 +154,7 @@ class ShapeTracker:
         reconstructor: with the poses of the views.
         warm: start from the previous frame where the image proves the prediction.
         preset, response, channels: see ``Extractor``. The views' poses determine the side that each view shows.
+        contact: reads force, torque and regions of every frame; None: not wanted.
 
     Raises:
         ValueError: no such preset, response or order of channels.
@@ -164,8 +168,9 @@ class ShapeTracker:
         preset: Preset = "balanced",
         response: Response | None = None,
         channels: Channels = "bgr",
+        contact: ContactReader | None = None,
     ) -> None:
-        self.reconstructor = reconstructor
+        self.reconstructor, self.contact = reconstructor, contact
         layout = reconstructor.layout
         sides = [_side_shown(layout, view, "designed") for view in reconstructor.poses.views]
         self._trackers = [
@@ -192,6 +197,7 @@ class ShapeTracker:
         )
         markers = [frame.markers if frame.status == FrameStatus.TRACKED else None for frame in tracked]
         shape = self.reconstructor.reconstruct(markers)
+        contact = None if self.contact is None else self.contact.read_shape(shape)
         found = bool(np.isfinite(shape.xyz_mm).any())
         worst = max((frame.status for frame in tracked), default=FrameStatus.LOST)
         status = FrameStatus.TRACKED if found else max(worst, FrameStatus.LOST)
@@ -203,6 +209,7 @@ class ShapeTracker:
             shape=shape,
             views=tracked,
             elapsed_ms=1e3 * (time.perf_counter() - started),
+            contact=contact,
         )
         self._count += 1
         return frame

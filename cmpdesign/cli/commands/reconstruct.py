@@ -15,7 +15,7 @@ from cmpdesign.cli.terminal import say_table
 from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.runs import PositionsPart, ReconstructDocument
+    from cmpdesign.documents.runs import ContactPart, PositionsPart, ReconstructDocument
 
 EXAMPLES = (
     "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
@@ -73,6 +73,17 @@ def _describe_positions(positions: PositionsPart) -> str:
     return f"of the pattern, {depth_mm:g} mm below the touched surface; not of the touched surface"
 
 
+def _describe_contact(contact: ContactPart) -> str:
+    reasons = contact.reasons.items()
+    text = ", ".join(f"{count} x {reason.replace('_', ' ')}" for reason, count in reasons)
+    press = contact.largest
+    if press is None:
+        return text
+    pairs = zip(press.force_n, press.force_sigma_n, strict=True)
+    force = ", ".join(f"{value:.3f} ± {sigma:.3f}" for value, sigma in pairs)
+    return f"{text}; largest ({force}) N in frame {press.frame}"
+
+
 def _print_summary(done: ReconstructDocument) -> None:
     rows = {
         "frames": frames_text(done.frames),
@@ -97,5 +108,7 @@ def _print_summary(done: ReconstructDocument) -> None:
         rows["largest displacement"] = (
             f"{largest.mm:.4f} mm, marker {largest.marker} in frame {largest.frame}"
         )
+    if done.contact is not None:
+        rows["contact"] = _describe_contact(done.contact)
     rows["time a frame"] = ", ".join(f"{name} {value:.1f} ms" for name, value in done.time_ms.items())
     say_table(rows)

@@ -77,7 +77,6 @@ class PngFolderWriter:
 
         with self._as_output_error():
             if self._stage is None:
-                self._path.parent.mkdir(parents=True, exist_ok=True)
                 self._stage = Stage(self._path.parent)
                 self._staged(self._stage).mkdir()
             file = self._staged(self._stage) / f"frame_{self._frames:06d}.png"

@@ -85,7 +85,6 @@ def write_lerobot(runs: Sequence[Path], path: Path, about: DataSet) -> int:
     if path.exists():
         raise OutputError(f"{path} exists; delete it, or give another name")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         with Stage(path.parent) as stage:
             staged = stage.folder / "dataset"
             frames = _write_folder(staged, runs, about)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.npz import NpzError, read_npz
 from cmpdesign.tracking.columns import Columns
+from cmpdesign.tracking.force_table import FORCE_COLUMNS
 from cmpdesign.tracking.recording.points import positions_mm
 
 _SHARED = ("frame", "time_s", "frame_status", "status", "layer")
@@ -21,7 +22,8 @@ _COLUMNS = {
     "cmp-tracking": (*_SHARED, "xy_px", "displacement_mm", "layout_from_image", "mm_per_px"),
     "cmp-reconstruction": (*_SHARED, "3D_Positions", "3D_Displacements"),
 }
-_SURFACE = "surface_displacement_mm"
+# What a run has with an option -> the columns of this option.
+_OPTIONAL = {"surface": ("surface_displacement_mm",), "contact": FORCE_COLUMNS}
 MAX_FPS = 1e5
 WHOLE_FPS = 0.005  # a rate within this distance of a whole number is rounded
 
@@ -34,7 +36,8 @@ class Run:
         path: the file.
         frame: (F,) int64, places in the source.
         arrays: name -> values: displacement_mm and position_mm (F, M, k) float32, NaN where lost; status (F, M) uint8;
-            frame_status (F,) uint8; time_s (F,) float64; with ``surface`` surface_displacement_mm (F, M, 3) float32.
+            frame_status (F,) uint8; time_s (F,) float64; with ``surface`` surface_displacement_mm (F, M, 3) float32;
+            with ``contact`` the ``FORCE_COLUMNS``.
     """
 
     path: Path
@@ -56,12 +59,13 @@ class RunKind:
     Attributes:
         format: of the files, for example "cmp-reconstruction".
         digest: of the layout.
-        surface: "with" or "without" the touched surface.
+        surface, contact: "with" or "without" the touched surface, or forces.
     """
 
     format: str
     digest: str
     surface: str
+    contact: str
 
 
 def read_run(path: Path) -> Run:
@@ -75,8 +79,13 @@ def read_run(path: Path) -> Run:
     if len(columns["frame"]) == 0:
         raise CmpDesignError(f"{path}: holds no frame")
     arrays = _arrays_of(columns, kind)
-    if kind.surface == "with":
-        arrays[_SURFACE] = _read_columns(path, _SURFACE)[_SURFACE].astype(np.float32)
+    for option, names in _OPTIONAL.items():
+        if getattr(kind, option) == "with":
+            further = _read_columns(path, *names)
+            arrays |= {
+                name: values.astype(np.float32 if values.dtype.kind == "f" else values.dtype)
+                for name, values in further.items()
+            }
     return Run(path, columns["frame"], arrays)
 
 
@@ -88,7 +97,7 @@ def require_one_kind(paths: Sequence[Path]) -> RunKind:
     """
     kinds = [_kind_of(path) for path in paths]
     for path, kind in zip(paths[1:], kinds[1:], strict=True):
-        for what in ("format", "digest", "surface"):
+        for what in ("format", "digest", *_OPTIONAL):
             one, other = getattr(kinds[0], what), getattr(kind, what)
             if one != other:
                 raise CmpDesignError(
@@ -136,12 +145,19 @@ def _kind_of(path: Path) -> RunKind:
         columns = {}
     if str(columns.get("format")) not in _COLUMNS:
         raise CmpDesignError(f"{path} is no run; expected an .npz file of track or reconstruct")
+    return RunKind(
+        str(columns["format"]),
+        str(columns["digest"]),
+        **{option: _with_or_without(path, names[0]) for option, names in _OPTIONAL.items()},
+    )
+
+
+def _with_or_without(path: Path, column: str) -> str:
     try:
-        read_npz(path, _SURFACE)
-        surface = "with"
+        read_npz(path, column)
     except NpzError:
-        surface = "without"
-    return RunKind(str(columns["format"]), str(columns["digest"]), surface)
+        return "without"
+    return "with"
 
 
 def _read_columns(path: Path, *names: str) -> Columns:

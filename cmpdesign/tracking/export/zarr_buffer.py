@@ -61,7 +61,6 @@ def write_zarr(
     if path.exists():
         raise OutputError(f"{path} exists; delete it, or give another name")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         with Stage(path.parent) as stage:
             staged = stage.folder / "buffer"
             buffer = _Buffer(staged)

@@ -225,6 +225,7 @@ class ReconstructJob:
             preset=how["preset"],
             response=how["response"],
             channels=how["channels"],
+            contact=contact,
         )
         statistics = ShapeStatistics(reconstructor, depth_mm, how["surface"])
         return TrackingRun(
@@ -327,11 +328,17 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 
 
 def _contact_reader(gel: Path, rig: Path, layout: Reference) -> ContactReader:
-    from cmpdesign.tracking.marker_depth import read_young_mpa
+    from cmpdesign.tracking.marker_depth import read_force_constants
     from extractor.contact import ContactReader, load_gel
 
-    young_mpa, sigma_mpa = read_young_mpa(rig)
-    return ContactReader(layout, load_gel(gel), young_mpa, young_sigma_mpa=sigma_mpa)
+    scale = read_force_constants(rig)
+    return ContactReader(
+        layout,
+        load_gel(gel),
+        scale.young_mpa,
+        young_sigma_mpa=scale.young_sigma_mpa,
+        friction=scale.friction,
+    )
 
 
 def _path(given: str | Path | None) -> Path | None:

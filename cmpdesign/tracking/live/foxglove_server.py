@@ -43,16 +43,19 @@ class FoxgloveServer:
         port: a free port on this machine.
         places: places of the shown images. All topics exist before a client can connect: to a connected client,
             the library may offer a topic before it accepts subscriptions to the topic.
+        has_contact: the frames hold a contact.
 
     Raises:
         CmpDesignError: a library is not installed, or the port cannot be opened.
     """
 
-    def __init__(self, frame_id: str, port: int, places: Iterable[ImagePlace] = ()) -> None:
+    def __init__(
+        self, frame_id: str, port: int, places: Iterable[ImagePlace] = (), has_contact: bool = False
+    ) -> None:
         self._foxglove, self._messages = require_foxglove(), TopicMessages(frame_id)
         self._context = self._foxglove.Context()
         self._channels: dict[str, Any] = {}
-        for topic, kind in self._messages.kinds(places).items():
+        for topic, kind in self._messages.kinds(places, has_contact).items():
             self._channel(topic, kind)
         self._watch, inner = _watch_log(self._foxglove), hidden_address()
         try:

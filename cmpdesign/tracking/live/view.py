@@ -145,8 +145,9 @@ def open_view(live: Live, table: FrameTable, recording: Recording) -> LiveView:
         from cmpdesign.tracking.live.foxglove_server import FoxgloveServer, require_foxglove
 
         require_foxglove()
-        places = image_places(shown.about(), recording.is_image_one_a_view) if recording.with_images else ()
-        server = FoxgloveServer(recording.frame_id, live.free_port(), places)
+        about = shown.about()
+        places = image_places(about, recording.is_image_one_a_view) if recording.with_images else ()
+        server = FoxgloveServer(recording.frame_id, live.free_port(), places, "young_mpa" in about)
     else:
         from cmpdesign.tracking.live.rerun_server import RerunServer
         from cmpdesign.tracking.recording.rerun_rows import require_rerun

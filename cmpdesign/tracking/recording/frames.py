@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmpdesign.errors import InputError
 from cmpdesign.files.image_header import size_in_header
-from cmpdesign.tracking.columns import FRAME_STATUS, Columns
+from cmpdesign.tracking.columns import AXES, COVARIANCE, FRAME_STATUS, Columns
+from cmpdesign.tracking.force_table import torque_about_origin
 from cmpdesign.tracking.recording.messages import ERROR, OK, WARN, Lens
 from cmpdesign.tracking.recording.options import QUALITY
-from cmpdesign.tracking.recording.points import Records, marker_records
+from cmpdesign.tracking.recording.points import M_PER_MM, Records, marker_records, region_records
 
 NS_PER_S = 10**9
 STEP_NS = NS_PER_S // 30  # time from the previous frame to a frame without a time of the source
@@ -61,6 +63,19 @@ class FrameImage:
 
 
 @dataclass(frozen=True, eq=False)
+class FrameContact:
+    """The contact of a frame, in the markers' frame.
+
+    Attributes:
+        wrench: (6,) force in N and torque in N m about the origin; NaN where unknown.
+        regions: (R,) records of ``REGION``.
+    """
+
+    wrench: NDArray[np.float64]
+    regions: Records
+
+
+@dataclass(frozen=True, eq=False)
 class RecordedFrame:
     """A frame.
 
@@ -72,6 +87,7 @@ class RecordedFrame:
         text: the frame's status, its reason and the hints.
         values: values of the diagnostics; numbers as text, "nan" where unknown.
         images: the images that are recorded or shown.
+        contact: the contact, if it is read.
     """
 
     number: int
@@ -81,6 +97,7 @@ class RecordedFrame:
     text: str
     values: dict[str, str]
     images: tuple[FrameImage, ...]
+    contact: FrameContact | None = None
 
 
 class FrameReader:
@@ -97,7 +114,7 @@ class FrameReader:
             about: its shared columns.
             images_of: gives the images.
         """
-        records = marker_records(columns, about)
+        records, contacts = marker_records(columns, about), _contacts(columns, about)
         views = [str(name) for name in about["view_names"]]
         began_ns = _began_ns(about)
         for place, number in enumerate(columns["frame"].tolist()):
@@ -111,6 +128,7 @@ class FrameReader:
                 text,
                 _diagnostic_values(row, records["status"][place], views),
                 tuple(_frame_images(number, about, images_of)),
+                contacts[place] if contacts else None,
             )
 
     def _time_ns(self, time_s: float) -> int:
@@ -118,6 +136,15 @@ class FrameReader:
         known = np.isfinite(time_s)
         self._last_ns = max(0, round(time_s * NS_PER_S)) if known else self._last_ns + STEP_NS
         return self._last_ns
+
+
+def _contacts(columns: Columns, about: Columns) -> list[FrameContact]:
+    """The contact of every frame; none without the columns of a contact."""
+    if "force_n" not in columns:
+        return []
+    torque_nmm = torque_about_origin(columns["torque_nmm"], columns["force_n"], about)
+    wrenches = np.concatenate([columns["force_n"], torque_nmm * M_PER_MM], axis=1)
+    return [FrameContact(*each) for each in zip(wrenches, region_records(columns, about), strict=True)]
 
 
 def _began_ns(about: Columns) -> int:
@@ -181,9 +208,18 @@ def _judge(row: dict[str, Any]) -> tuple[int, str]:
     it.
     """
     status, reason, hints = FRAME_STATUS[row["frame_status"]], str(row["reason"]), str(row["hints"])
-    notes = "; ".join(note for note in (reason, hints) if note)
+    notes = "; ".join(note for note in (reason, hints, _contact_note(row)) if note)
     level = ERROR if status != "tracked" else WARN if notes else OK
     return level, f"{status}: {notes}" if notes else status
+
+
+def _contact_note(row: dict[str, Any]) -> str:
+    """Why a tracked frame has no force, or why it is to be doubted; empty at rest."""
+    from extractor.contact import ContactReason
+
+    found = ContactReason(row.get("contact_reason", ContactReason.NONE))
+    is_usual = found is ContactReason.NOTHING_TOUCHED or FRAME_STATUS[row["frame_status"]] != "tracked"
+    return "" if is_usual else found.text
 
 
 def _diagnostic_values(row: dict[str, Any], statuses: Any, views: list[str]) -> dict[str, str]:
@@ -198,7 +234,25 @@ def _diagnostic_values(row: dict[str, Any], statuses: Any, views: list[str]) -> 
     if "start" in row:
         values["start"] = str(row["start"])
     values |= {f"markers_{name}": str(count) for name, count in zip(_STATUS_NAMES, counts, strict=True)}
+    if "force_n" in row:
+        values |= _contact_values(row)
     for name, numbers in zip(views or [""], row["quality"], strict=True):
         before = f"{name}." if len(views) > 1 else ""
         values |= {f"{before}{key}": f"{v:.6g}" for key, v in zip(QUALITY, numbers.tolist(), strict=True)}
     return values
+
+
+def _contact_values(row: dict[str, Any]) -> dict[str, str]:
+    """Reason, number of regions, and the standard deviations of force (N) and torque (N m)."""
+    from extractor.contact import ContactReason
+
+    diagonal = [COVARIANCE.index(name) for name in ("xx", "yy", "zz")]
+    sigma_n, sigma_nmm = (np.sqrt(row[name][diagonal]) for name in ("force_cov_n2", "torque_cov_nmm2"))
+    values = {
+        "contact_reason": ContactReason(row["contact_reason"]).name.lower(),
+        "contact_regions": str(row["contact_regions"]),
+        "utilisation": f"{row['utilisation']:.6g}",
+    }
+    values |= {f"force_sigma_{axis}": f"{value:.6g}" for axis, value in zip(AXES, sigma_n, strict=True)}
+    torques = zip(AXES, sigma_nmm * M_PER_MM, strict=True)
+    return values | {f"torque_sigma_{axis}": f"{value:.6g}" for axis, value in torques}

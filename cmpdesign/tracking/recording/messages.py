@@ -12,6 +12,7 @@ POINTS = "sensor_msgs/msg/PointCloud2"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 IMAGE = "sensor_msgs/msg/CompressedImage"
 CAMERA = "sensor_msgs/msg/CameraInfo"
+WRENCH = "geometry_msgs/msg/WrenchStamped"
 OK, WARN, ERROR = 0, 1, 2  # levels of a DiagnosticStatus
 # Codes of a PointField's datatype.
 _DATATYPES = {"uint8": 2, "uint32": 6, "float32": 7}
@@ -94,6 +95,15 @@ class Messages:
             values=pairs,
         )
         return self._types[DIAGNOSTICS](header=self._header(stamp), status=[status])
+
+    def wrench(self, stamp: Stamp, wrench: NDArray[np.float64]) -> Any:
+        """A WrenchStamped of force x, y, z in N and torque x, y, z in N m about the origin of the frame."""
+        vector = self._types["geometry_msgs/msg/Vector3"]
+        force, torque = (
+            vector(**dict(zip("xyz", part.tolist(), strict=True))) for part in (wrench[:3], wrench[3:])
+        )
+        both = self._types["geometry_msgs/msg/Wrench"](force=force, torque=torque)
+        return self._types[WRENCH](header=self._header(stamp), wrench=both)
 
     def image(self, stamp: Stamp, png: bytes) -> Any:
         """A CompressedImage of a PNG file's bytes."""

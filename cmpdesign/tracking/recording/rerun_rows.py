@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.libraries import extra
-from cmpdesign.tracking.recording.frames import CameraView, FrameImage, RecordedFrame
+from cmpdesign.tracking.recording.frames import CameraView, FrameContact, FrameImage, RecordedFrame
 from cmpdesign.tracking.recording.messages import ERROR, OK, WARN
 from cmpdesign.tracking.recording.points import Records
 
@@ -23,6 +23,7 @@ _VECTORS: Mapping[str, tuple[str, ...]] = {
     "surface_displacement": ("surface_dx", "surface_dy", "surface_dz"),
     "xy_px": ("x_px", "y_px"),
     "displacement_px": ("dx_px", "dy_px"),
+    "traction": ("traction_x", "traction_y", "traction_z"),
 }
 _POSITION = ("x", "y", "z")
 _LEVELS = {OK: "INFO", WARN: "WARN", ERROR: "ERROR"}
@@ -68,6 +69,9 @@ class RerunRows:
         yield self._rows(f"{self._base}/markers", frames, self._markers(records))
         yield self._rows(f"{self._base}/displacement", frames, self._arrows(records))
         yield self._rows(DIAGNOSTICS_ENTITY, frames, self._diagnostics(frames))
+        contacts = [frame.contact for frame in frames if frame.contact is not None]
+        if contacts:
+            yield from self._contacts(frames, contacts)
         yield from self._images(frames)
 
     def _rows(self, entity: str, frames: Sequence[RecordedFrame], columns: Iterable[Any]) -> EntityRows:
@@ -111,6 +115,28 @@ class RerunRows:
         )
         values = {name: [frame.values[name] for frame in frames] for name in frames[0].values}
         return [*log, *self._own("Diagnostics", values)]
+
+    def _contacts(
+        self, frames: Sequence[RecordedFrame], contacts: Sequence[FrameContact]
+    ) -> Iterator[EntityRows]:
+        """Force and torque, which viewers plot over time, and the regions: a point and its values."""
+        wrenches = np.stack([contact.wrench for contact in contacts])
+        for name, values in (("force", wrenches[:, :3]), ("torque", wrenches[:, 3:])):
+            scalars = self._rerun.Scalars.columns(scalars=values.ravel()).partition([3] * len(values))
+            yield self._rows(f"{self._base}/{name}", frames, scalars)
+        records = np.concatenate([contact.regions for contact in contacts])
+        own = {
+            "area": records["area"],
+            "force": _fixed_lists(_joined(records, ("force_x", "force_y", "force_z"))),
+            "torque": _fixed_lists(_joined(records, ("torque_x", "torque_y", "torque_z"))),
+        } | {
+            name: _fixed_lists(records[name])
+            for name in ("centre_covariance", "force_covariance", "torque_covariance")
+        }
+        points = self._rerun.Points3D.columns(positions=_joined(records, _POSITION))
+        counts = [len(contact.regions) for contact in contacts]
+        columns = [*points.partition(counts), *self._own("Regions", own).partition(counts)]
+        yield self._rows(f"{self._base}/regions", frames, columns)
 
     def _images(self, frames: Iterable[RecordedFrame]) -> Iterator[EntityRows]:
         """Each image and its cameras; an entity has the frames with this image."""

@@ -8,7 +8,15 @@ from typing import Any
 
 from cmpdesign.libraries import extra
 from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
-from cmpdesign.tracking.recording.messages import CAMERA, DIAGNOSTICS, IMAGE, POINTS, Messages, Stamp
+from cmpdesign.tracking.recording.messages import (
+    CAMERA,
+    DIAGNOSTICS,
+    IMAGE,
+    POINTS,
+    WRENCH,
+    Messages,
+    Stamp,
+)
 
 DIAGNOSTICS_TOPIC = "/diagnostics"
 
@@ -72,20 +80,27 @@ class TopicMessages:
         """The topic of the markers."""
         return f"/{self._frame_id}/markers"
 
-    def kinds(self, places: Iterable[ImagePlace] = ()) -> dict[str, str]:
-        """The types of all topics: of the markers, the diagnostics, and of images at the places."""
+    def kinds(self, places: Iterable[ImagePlace] = (), has_contact: bool = False) -> dict[str, str]:
+        """The types of all topics: of the markers, the diagnostics, of images at the places, and of a contact."""
         kinds = {self.points_topic: POINTS, DIAGNOSTICS_TOPIC: DIAGNOSTICS}
+        if has_contact:
+            kinds |= {f"/{self._frame_id}/wrench": WRENCH, f"/{self._frame_id}/regions": POINTS}
         for place in places:
             kinds[image_topic(place.base)] = IMAGE
             kinds |= {camera_topic(view.base): CAMERA for view in place.views}
         return kinds
 
     def of(self, frame: RecordedFrame) -> Iterator[TopicMessage]:
-        """The messages of a frame: markers, diagnostics, images, and the cameras of each image."""
+        """The messages of a frame: markers, diagnostics, contact, images, and the cameras of each image."""
         make, stamp = self._messages, Stamp(frame.ns, self._frame_id)
         yield self._message(self.points_topic, POINTS, make.points(stamp, frame.markers), frame.ns)
         report = make.diagnostics(stamp, frame.level, frame.text, frame.values)
         yield self._message(DIAGNOSTICS_TOPIC, DIAGNOSTICS, report, frame.ns)
+        if frame.contact is not None:
+            wrench = make.wrench(stamp, frame.contact.wrench)
+            yield self._message(f"/{self._frame_id}/wrench", WRENCH, wrench, frame.ns)
+            regions = make.points(stamp, frame.contact.regions)
+            yield self._message(f"/{self._frame_id}/regions", POINTS, regions, frame.ns)
         for image in frame.images:
             stamp = Stamp(frame.ns, image.frame_id)
             picture = make.image(stamp, image.png)

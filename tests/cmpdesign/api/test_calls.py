@@ -35,7 +35,7 @@ CALLS = {
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
 }
-NOT_CALLS = {"init"}  # of files for editors
+NOT_CALLS = {"init", "studio"}  # of files for editors; of a page
 
 
 @pytest.fixture(scope="module")

@@ -64,7 +64,7 @@ def test_a_dash_is_no_file(name: tuple[str, ...], tmp_path: Path, monkeypatch: p
         assert result.exit_code == 2 and "standard input and output are not supported" in result.stderr
         assert len(result.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
-    assert paths or name in {("templates",), ("schema",), ("check",), ("cameras",)}
+    assert paths or name in {("templates",), ("schema",), ("check",), ("cameras",), ("studio",)}
 
 
 # -- Ctrl-C

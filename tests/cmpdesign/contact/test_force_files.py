@@ -7,9 +7,14 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet
 import pytest
+import zarr
 
 from tests.support.command import refused, run
+from tests.support.tracking.files import loaded
+from tests.support.tracking.foxglove_client import free_port, received_while
+from tests.support.tracking.messages import points_of, read_messages
 from tests.support.tracking.press import write_press
 
 pytestmark = pytest.mark.slow  # the block of a pad of 8 layers
@@ -55,6 +60,60 @@ def test_tables_hold_force_torque_and_traction(made: Path, tmp_path: Path) -> No
     last = rows[3 * points]
     assert float(last["force_z_n"]) == pytest.approx(table["force_n"][3, 2], abs=1e-6)
     assert float(last["traction_z_mpa"]) == pytest.approx(table["marker_traction_mpa"][3, 0, 2], abs=1e-6)
+
+
+def test_a_recording_and_a_live_viewer_get_the_tables_wrench(made: Path, tmp_path: Path) -> None:
+    """Torques of messages are about the origin of the markers' frame, in the plane of the pattern."""
+    assert run(*reconstruct(made, tmp_path / "a.npz")).exit_code == 0
+    table, port = loaded(tmp_path / "a.npz"), free_port()
+    live = ("--live", "foxglove", "--live-port", port, "--live-wait", 30)
+
+    def follow() -> None:
+        result = run(*reconstruct(made, tmp_path / "a.mcap"), *live)
+        assert result.exit_code == 0, result.output
+
+    shown, messages = received_while(follow, port), read_messages(tmp_path / "a.mcap")
+    for topic, kept in messages.items():
+        assert [data for _, data in shown.messages[topic]] == [one.message.data for one in kept], topic
+    wrenches = [one.decoded_message.wrench for one in messages["/tactile/wrench"]]
+    forces = np.array([[one.force.x, one.force.y, one.force.z] for one in wrenches])
+    np.testing.assert_array_equal(forces, table["force_n"])
+    torques = 1e3 * np.array([[one.torque.x, one.torque.y, one.torque.z] for one in wrenches])
+    np.testing.assert_allclose(
+        torques, table["torque_nmm"] + np.cross([0, 0, 0.5], table["force_n"]), rtol=1e-12
+    )
+    points = np.stack([points_of(one) for one in messages["/tactile/markers"]])
+    traction = (table["marker_traction_mpa"].astype(float) * 1e6).astype("f4")
+    for place, axis in enumerate("xyz"):
+        np.testing.assert_array_equal(points[f"traction_{axis}"][..., 0], traction[..., place])
+    regions = [points_of(one) for one in messages["/tactile/regions"]]
+    assert [len(one) for one in regions] == table["contact_regions"].tolist()
+    last = regions[3]
+    count = len(last)
+    np.testing.assert_array_equal(last["force_z"][:, 0], table["region_force_n"][3, :count, 2].astype("f4"))
+    np.testing.assert_allclose(last["area"][:, 0], 1e-6 * table["region_area_mm2"][3, :count], rtol=1e-6)
+    values = {one.key: one.value for one in messages["/diagnostics"][3].decoded_message.status[0].values}
+    assert float(values["force_sigma_z"]) == pytest.approx(np.sqrt(table["force_cov_n2"][3, 5]), rel=1e-5)
+
+
+def test_exports_take_the_forces_over(made: Path, tmp_path: Path) -> None:
+    assert run(*reconstruct(made, tmp_path / "a.npz")).exit_code == 0
+    table = loaded(tmp_path / "a.npz")
+    assert run("export", "zarr", tmp_path / "a.npz", "-o", tmp_path / "a.zarr").exit_code == 0
+    data = zarr.open_group(str(tmp_path / "a.zarr"), mode="r")["data"]
+    words = ("export", "lerobot", tmp_path / "a.npz", "-o", tmp_path / "set", "--fps", "30")
+    assert run(*words).exit_code == 0
+    rows = pyarrow.parquet.read_table(next((tmp_path / "set/data").rglob("*.parquet")))
+    for name in ("force_n", "torque_cov_nmm2", "contact_reason"):
+        np.testing.assert_array_equal(
+            data[f"tactile_{name}"][:], table[name].astype(data[f"tactile_{name}"].dtype)
+        )
+        kept = np.array(rows[f"observation.tactile.{name}"].to_pylist()).reshape(table[name].shape)
+        np.testing.assert_array_equal(kept, data[f"tactile_{name}"][:])
+    words = ("reconstruct", made / "layout.json", made / "sensor.toml", "0", made / "frames")
+    assert run(*words, "-o", tmp_path / "b.npz").exit_code == 0
+    both = (tmp_path / "a.npz", tmp_path / "b.npz")
+    assert "the contact is without" in refused("export", "zarr", *both, "-o", tmp_path / "c.zarr")
 
 
 def test_weights_give_a_modulus_and_bad_files_one_line(made: Path, tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ import re
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -224,6 +226,20 @@ def test_a_stage_of_a_living_process_stays(tmp_path: Path) -> None:
         write_folder(tmp_path, {"b": "2"})
         assert stage.folder.is_dir()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+
+
+def test_stages_made_at_the_same_time_stay_though_their_empty_folder_is_removed(tmp_path: Path) -> None:
+    def work(_: int) -> None:
+        for _ in range(50):
+            with Stage(tmp_path / "inner" / "folder") as stage:
+                (stage.folder / "a").write_text("1")
+            for folder in ("inner/folder", "inner"):
+                with suppress(OSError):
+                    (tmp_path / folder).rmdir()
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(work, range(4)))
+    assert not list(tmp_path.iterdir())
 
 
 def test_stages_of_dead_processes_go_and_nothing_else(tmp_path: Path) -> None:

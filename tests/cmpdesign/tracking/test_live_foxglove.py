@@ -204,7 +204,9 @@ def test_what_viewers_did_not_get_is_said(
     command = ("track", made / "layout.json", made / "video.avi", "-o", tmp_path / "a.npz")
     options = ("--live", "foxglove", "--live-port", "0")
     monkeypatch.setattr("cmpdesign.tracking.live.view.QUEUE_FRAMES", 1)
-    monkeypatch.setattr(FoxgloveServer, "send", lambda *_: time.sleep(0.2))
+    is_over, close = Event(), LiveView.close
+    monkeypatch.setattr(FoxgloveServer, "send", lambda *_: is_over.wait(60))
+    monkeypatch.setattr(LiveView, "close", lambda view: [is_over.set(), close(view)][1])
     monkeypatch.setattr(FoxgloveServer, "is_behind", lambda _: True)
     result = run(*command, *options)
     assert result.exit_code == 0 and f"of {FRAMES} frames were not shown live" in result.stderr
