@@ -13,7 +13,6 @@ from cmpdesign import __version__
 from cmpdesign.cli.command import Command, OneLineErrors, examples, exit_interrupted
 from cmpdesign.cli.commands import (
     build,
-    cameras,
     check,
     evaluate,
     kerf,
@@ -27,7 +26,7 @@ from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.pages import studio
-from cmpdesign.cli.commands.starting import init, schema, templates
+from cmpdesign.cli.commands.starting import cameras, init, schema, templates
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
 from cmpdesign.errors import OutputError
 
