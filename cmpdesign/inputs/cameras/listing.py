@@ -9,12 +9,15 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmpdesign.errors import SourceError
+from cmpdesign.errors import InputError, SourceError
 from cmpdesign.inputs.cameras.v4l2 import CameraOffer, offer_of
+from cmpdesign.inputs.files import read_text
+from cmpdesign.inputs.texts import visible
 
 SYSTEM = Path("/sys/class/video4linux")
 DEVICES = Path("/dev")
 _DEVICE = re.compile(r"video(\d+)", re.ASCII)
+_MOST_BYTES = 4096  # of a file of the kernel
 _PARENTS = 4  # from a device to the USB device that has the serial number
 
 
@@ -99,6 +102,6 @@ def _serial(entry: Path) -> str:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8", errors="replace").strip()[:100]
-    except OSError:
+        return visible(read_text(path, _MOST_BYTES).strip())[:100]
+    except InputError:
         return ""
