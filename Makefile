@@ -50,10 +50,10 @@ demo: $(BASE) $(CORE)
 	@$(BIN)/python -m cmpdesign.demo
 
 test: $(READY) $(CORE)
-	@$(BIN)/python -m pytest -n 2
+	@$(BIN)/python -m pytest -n 2 --dist worksteal
 
 test-all: $(READY) $(CORE)
-	@$(BIN)/python -m pytest -n 2 -m ''
+	@$(BIN)/python -m pytest -n 2 --dist worksteal -m ''
 
 lint: $(READY) $(CORE)
 	@$(BIN)/ruff check .

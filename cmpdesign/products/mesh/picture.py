@@ -16,7 +16,7 @@ MARGIN_SHARE = 0.04
 # Faces turned away from the light keep this share of their color.
 AMBIENT_SHARE = 0.35
 LIGHT_DIRECTION = np.array([0.35, 0.5, 0.8]) / np.linalg.norm([0.35, 0.5, 0.8])
-OUTLINE_BRIGHTNESS = 0.35
+OUTLINE_BRIGHTNESS, WHITE_BGR = 0.35, (255.0, 255.0, 255.0)
 # An outline is a jump in depth by more than this share of the picture's height, or in shade by more than this.
 DEPTH_JUMP, SHADE_JUMP = 0.004, 0.07
 
@@ -96,12 +96,11 @@ def draw_meshes(
     depth = np.full((height, width), -np.inf)
     number = np.full((height, width), -1, dtype=np.int64)
     depth_buffer.fill_depth_buffer(corners, depth, number)
-    picture = np.full((height, width, 3), 255.0)
-    hit = number >= 0
-    picture[hit] = colors[number[hit]] * shades[number[hit]][:, None]
-    outlines = _find_outlines(depth, number, shades, _depth_slopes(corners))
+    # The last row of every table belongs to the number -1, of pixels without a triangle.
+    picture = np.vstack([colors * shades[:, None], [WHITE_BGR]]).astype(np.float32)[number]
+    outlines = _find_outlines(depth, number, np.append(shades, 2.0), _depth_slopes(corners))
     picture[outlines] *= OUTLINE_BRIGHTNESS
-    small = cv2.resize(picture.astype(np.float32), size_px, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(picture, size_px, interpolation=cv2.INTER_AREA)
     return np.clip(np.rint(small), 0, 255).astype(np.uint8)
 
 
@@ -118,21 +117,22 @@ def _triangle_shades(corners: Floats, direction: ViewDirection) -> Floats:
 
 
 def _depth_slopes(corners: Floats) -> Floats:
-    """(T, 2) change of a triangle's depth from a pixel to the pixel below and to the pixel right of it."""
+    """(T + 1, 2) change of a triangle's depth from a pixel to the pixel below and to the pixel right of it; then 0."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.abs(normals[:, 1::-1]) / np.maximum(np.abs(normals[:, 2:]), 1e-9)
+    slopes = np.abs(normals[:, 1::-1]) / np.maximum(np.abs(normals[:, 2:]), 1e-9)
+    return np.vstack([slopes, np.zeros(2)])
 
 
 def _find_outlines(
     depth: Floats, number: NDArray[np.int64], shades: Floats, slopes: Floats
 ) -> NDArray[np.bool_]:
     """(H, W) True where depth or shade jumps to the right or lower pixel by more than the faces' own slope."""
-    shade = np.where(number >= 0, shades[number], 2.0)
+    shade = shades[number]
     far = np.where(np.isfinite(depth), depth, -1e6)
     least_jump = DEPTH_JUMP * depth.shape[0]
     outlines = np.zeros(depth.shape, dtype=np.bool_)
     for axis in (0, 1):
-        slope = np.where(number >= 0, slopes[number, axis], 0.0)
+        slope = slopes[:, axis][number]
         index = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
         after = (slice(1, None), slice(None)) if axis == 0 else (slice(None), slice(1, None))
         jump = np.abs(np.diff(far, axis=axis)) > least_jump + np.minimum(slope[index], slope[after])

@@ -60,9 +60,17 @@ def require_as_designed(layout: Layout, pad: SeenPad) -> None:
     assert pad.rms <= RMS_PITCHES and pad.worst <= WORST_PITCHES
 
 
-@pytest.mark.parametrize("mirrored", ["true", "false"])
-def test_a_small_cast_pad_is_read_as_designed(mirrored: str, tmp_path: Path) -> None:
-    require_as_designed(*cast(tmp_path, "honeycomb", layers="3", mirrored=mirrored))
+@pytest.fixture(scope="module", params=["true", "false"])
+def small(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Layout]:
+    """The folder and the layout of a small pad's meshes and laser job, mirrored or not."""
+    folder = tmp_path_factory.mktemp("small")
+    return folder, built(folder, "honeycomb", "mesh,laser", layers="3", mirrored=request.param)
+
+
+def test_a_small_cast_pad_is_read_as_designed(small: tuple[Path, Layout]) -> None:
+    folder, layout = small
+    cells = cast_pad(folder, load_silicone("dragon-skin-10").scale)
+    require_as_designed(layout, read_seen(layout, cells))
 
 
 @pytest.mark.parametrize(("name", "mirrored"), [("gelsight-mini", "true"), ("round", "false")])
@@ -102,17 +110,16 @@ def test_cells_of_the_wrong_size_or_side_would_be_seen(tmp_path: Path) -> None:
     assert read_seen(layout, turned).mirrored
 
 
-@pytest.mark.parametrize("mirrored", ["true", "false"])
-def test_predicted_cells_are_those_of_the_written_files(mirrored: str, tmp_path: Path) -> None:
+def test_predicted_cells_are_those_of_the_written_files(small: tuple[Path, Layout]) -> None:
     """Area of the difference of both, against the area of the cells."""
-    layout = built(tmp_path, "honeycomb", "mesh,laser", layers="2", mirrored=mirrored)
+    folder, layout = small
     side = np.array([-1.0 if layout.mirrored else 1.0, 1.0])
     found = {
-        "mold": cast_pad(tmp_path, load_silicone("dragon-skin-10").scale),
-        "laser": carved_cells(tmp_path, layout),
+        "mold": cast_pad(folder, load_silicone("dragon-skin-10").scale),
+        "laser": carved_cells(folder, layout),
     }
     for product, cells in found.items():
-        predicted = read_layout(tmp_path / "as-made" / f"{product}.json")
+        predicted = read_layout(folder / "as-made" / f"{product}.json")
         assert predicted.as_made is not None
         assert (predicted.as_made.of, predicted.as_made.product) == (layout.digest, product)
         assert predicted.as_made.side == seen_side(layout.mirrored)

@@ -342,7 +342,7 @@ def test_frustum_of_circles() -> None:
 
 
 def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> None:
-    design = load("honeycomb", {"layers": "3"})
+    design = load("honeycomb", {"layers": "1"})
     layout = build_layout(design)
     alone = make.make_mold(design, layout)
     monkeypatch.setattr(processes, "MIN_BOSSES_FOR_TWO", 0)

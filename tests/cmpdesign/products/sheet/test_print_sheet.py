@@ -406,26 +406,6 @@ def test_as_many_pads_as_fit() -> None:
             make_print_sheet(parameters, build_layout(parameters))
 
 
-def test_the_page_about_molds_says_what_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every command in docs/how-to/molds.md, in its order; a scan is made where one is read."""
-    import resvg_py
-
-    page = (Path(__file__).parents[4] / "docs" / "how-to" / "molds.md").read_text(encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    commands = re.findall(r"^(?:\$ |    )cmpdesign (.*)$", page, flags=re.MULTILINE)
-    assert [command.split()[0] for command in commands] == ["build", "check", "verify"]
-    for command in commands:
-        if command.startswith("verify"):
-            svg = Path("out/print/sheet.svg").read_text(encoding="utf-8")
-            png = np.frombuffer(bytes(resvg_py.svg_to_bytes(svg_string=svg, dpi=300)), np.uint8)
-            saved(np.asarray(cv2.imdecode(png, cv2.IMREAD_COLOR)), Path("scan.png"), dpi=(300, 300))
-        result = CliRunner().invoke(app, command.split())
-        assert result.exit_code == 0, (command, result.output)
-        if command.startswith("verify"):
-            assert "at 300 dpi" in result.output
-    assert {path.name for path in Path("out").iterdir()} >= {"mold", "mesh", "print", "layout.json"}
-
-
 @pytest.mark.parametrize(
     ("mirrored", "film", "page_mirrored", "said"),
     [
