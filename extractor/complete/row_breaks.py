@@ -155,6 +155,7 @@ def _lost_along_a_row(
     xy = np.where(known[:, None], markers.xy_px, np.nan)
     place = np.where(known[:, None], xy, extrapolate_pattern(xy, topology).xy)
     inside = np.all((place >= 0) & (place < size_px), axis=1)
+    inside &= np.all(topology.spokes >= 0, axis=1)  # the rim is lost along a row under blur, too
     place, known = place[inside], known[inside]
     rows, columns = (_lost_lines(place[:, axis], known, edge) for axis in (1, 0))
     if len(rows) == 0 or len(columns) or _goes_on_across(topology, xy, rows, edge):
