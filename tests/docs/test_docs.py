@@ -53,7 +53,7 @@ FENCE = re.compile(r"^```(\w+)(?: ([\w.]+))?\n(.*?)^```$", re.MULTILINE | re.DOT
 DECIMAL = re.compile(r"-?\d+\.\d+")
 FREE_MS = re.compile(r"\d+(\.\d+)? ms")
 COLUMNS = "120"
-SLOW_PAGES = {"cast-pad", "compare-designs"}
+SLOW_PAGES = {"cast-pad", "compare-designs", "evaluation"}
 DEMO_FIGURES = ("visible", "measured", "wrong ids", "RMS error per axis")
 
 
