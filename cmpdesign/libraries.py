@@ -32,6 +32,7 @@ EXTRAS = {
     "rerun": "recordings and a live view for Rerun",
     "data": "data sets for training",
     "dask": "data sets made by several machines",
+    "studio": "the page in the browser",
 }
 # Distributions of another name than their module.
 _DISTRIBUTIONS = {

@@ -8,11 +8,14 @@ The example needs ezdxf and SciPy: pip install '.[laser]'.
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import cmpdesign
 
 
 def main(template: str = "tac3d", kerf_mm: str = "0.14") -> None:
+    if Path("pad").exists():
+        sys.exit("the folder pad exists: rename or remove it, so that no file is overwritten")
     design = cmpdesign.load(template, {"laser.kerf_mm": float(kerf_mm)}, layers=6)
     checked = design.check(read=True)
     for finding in checked.findings:

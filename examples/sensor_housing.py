@@ -51,5 +51,7 @@ def sensor(template: str) -> Compound:
 
 if __name__ == "__main__":
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "housing.step")
+    if target.exists():
+        sys.exit(f"{target} exists: name another file, so that no file is overwritten")
     export_step(sensor("gelsight-mini"), target)
     print(f"wrote {target}")

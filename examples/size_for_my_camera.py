@@ -8,11 +8,14 @@ The example needs SciPy: pip install '.[evaluate]'.
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import cmpdesign
 
 
 def main(camera: str = "1280x960", view: str = "24x18mm") -> None:
+    if Path("sized").exists():
+        sys.exit("the folder sized exists: rename or remove it, so that no file is overwritten")
     finest = cmpdesign.size(camera, view)
     for name, text in finest.figures().items():
         print(f"{name:18s}{text}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -34,10 +35,19 @@ STATUS_BGR = {
     Status.FITTED: (255, 120, 255),
 }
 WHITE_BGR = (255, 255, 255)
+CAPTION_BGR = (25, 25, 25)
+
+
+class CaptionPart(NamedTuple):
+    """A text of a caption, after a sample of what the text explains: "dot", "ring" or "line"; without a color, none."""
+
+    text: str
+    color: tuple[int, int, int] | None = None
+    sample: str = "dot"
 
 
 def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) -> Picture:
-    """The image with its gridlines, markers (colored by status), ids and a caption.
+    """The image with its gridlines, markers (colored by status), ids, and a caption that is the legend.
 
     Args:
         image: as for ``Extractor.extract``.
@@ -52,8 +62,11 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
     canvas = _enlarged(base, scale, 0.7)
     points = _picture_coordinates(markers.xy_px, scale)
     _draw_edges(canvas, reference, points)
-    _draw_reference(canvas, reference, points)
-    _draw_fiducials(canvas, reference, points)
+    legend = _summary(markers)
+    if _draw_reference(canvas, reference, points):
+        legend.append(CaptionPart("marker 0 of the white cell", WHITE_BGR, "ring"))
+    if _draw_fiducials(canvas, reference, points):
+        legend[-1] = CaptionPart("marker 0, and registration marks", WHITE_BGR, "ring")
     edge = _median_edge(reference, points)
     radius = float(np.clip(edge / 9, 1.5, 6.0))
     for status, color in STATUS_BGR.items():
@@ -61,7 +74,8 @@ def draw_markers(image: NDArray[Any], reference: Reference, markers: Markers) ->
             _draw_dot(canvas, x, y, radius, color)
     if edge >= ID_EDGE_PX:
         _draw_ids(canvas, points, edge)
-    _draw_caption(canvas, _summary(markers))
+        legend.append(CaptionPart("numbers: ids"))
+    draw_caption(canvas, legend)
     return canvas
 
 
@@ -145,27 +159,31 @@ def _draw_edges(canvas: Picture, reference: Reference, points: NDArray[np.float6
     _draw_lines(canvas, lines[np.isfinite(lines).all(axis=(1, 2))], (190, 190, 190))
 
 
-def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
+def _draw_reference(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> bool:
+    """Draw the white cell and a ring around its marker, and return whether their place is known."""
     corners = points[reference.cell_corners[reference.reference_cell]]
-    if np.isfinite(corners).all():
-        _draw_lines(canvas, corners[None], WHITE_BGR, 2)
-        x, y = points[reference.reference_marker]
-        _draw_dot(canvas, x, y, 9.0, WHITE_BGR, 2)
+    if not np.isfinite(corners).all():
+        return False
+    _draw_lines(canvas, corners[None], WHITE_BGR, 2)
+    x, y = points[reference.reference_marker]
+    _draw_dot(canvas, x, y, 9.0, WHITE_BGR, 2)
+    return True
 
 
-def _draw_fiducials(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> None:
-    """Draw rings where the registration marks must be by the markers' homography from the layout."""
+def _draw_fiducials(canvas: Picture, reference: Reference, points: NDArray[np.float64]) -> bool:
+    """Draw rings where the registration marks must be by the markers' homography, and return whether any was drawn."""
     known = np.isfinite(points[:, 0])
     if len(reference.fiducials_mm) == 0 or known.sum() < 4:
-        return
+        return False
     homography, _ = cv2.findHomography(reference.xy_mm[known], points[known])
     if homography is None:
-        return
+        return False
     angles = np.linspace(0.0, 2 * np.pi, 33)[:-1]
     ring = 0.5 * reference.fiducial_diameter_mm * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     rings_mm = (reference.fiducials_mm[:, None] + ring).reshape(-1, 1, 2)
     rings = np.asarray(cv2.perspectiveTransform(rings_mm, homography), np.float64)
     _draw_lines(canvas, rings.reshape(-1, len(ring), 2), WHITE_BGR, 2)
+    return True
 
 
 def _median_edge(reference: Reference, points: NDArray[np.float64]) -> float:
@@ -184,21 +202,39 @@ def _draw_ids(canvas: Picture, points: NDArray[np.float64], edge: float) -> None
         cv2.putText(canvas, str(marker), corner, cv2.FONT_HERSHEY_SIMPLEX, size, WHITE_BGR, 1, cv2.LINE_AA)
 
 
-def _summary(markers: Markers) -> str:
+def _summary(markers: Markers) -> list[CaptionPart]:
     if markers.reason is not None and not np.any(markers.status):
-        return f"nothing found: {markers.reason.replace('_', ' ')}"
-    counts = {status.name.lower(): int(np.sum(markers.status == status)) for status in STATUS_BGR}
+        return [CaptionPart(f"nothing found: {markers.reason.replace('_', ' ')}")]
+    counts = {status: int(np.sum(markers.status == status)) for status in STATUS_BGR}
+    parts = [
+        CaptionPart(f"{n} {status.name.lower()}", STATUS_BGR[status]) for status, n in counts.items() if n
+    ]
     side = "back" if markers.mirrored else "front"
-    found = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-    return f"{found} of {len(markers.status)} markers, seen from the {side}"
+    return [*parts, CaptionPart(f"of {len(markers.status)} markers, seen from the {side}")]
 
 
-def _draw_caption(canvas: Picture, text: str) -> None:
+def draw_caption(canvas: Picture, parts: Sequence[CaptionPart], at_top: bool = False) -> None:
+    """Draw texts with their samples in a dark strip at the lower or upper side of a picture."""
     height, width = canvas.shape[:2]
     size = float(np.clip(width / 1600, 0.4, 1.0))
-    cv2.rectangle(canvas, (0, height - round(34 * size)), (width, height), (25, 25, 25), -1)
-    corner = (round(12 * size), height - round(11 * size))
-    cv2.putText(canvas, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
+    top, x = 0 if at_top else height - round(34 * size), 12 * size
+    cv2.rectangle(canvas, (0, top), (width, top + round(34 * size)), CAPTION_BGR, -1)
+    for part in parts:
+        if part.color is not None:
+            _draw_sample(canvas, x + 9 * size, top + 17 * size, 7 * size, part)
+            x += 26 * size
+        text = part.text.encode("ascii", "replace").decode()
+        origin = (round(x), top + round(23 * size))
+        cv2.putText(canvas, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
+        x += cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, 1)[0][0] + 22 * size
+
+
+def _draw_sample(canvas: Picture, x: float, y: float, radius: float, part: CaptionPart) -> None:
+    assert part.color is not None
+    if part.sample == "line":
+        _draw_lines(canvas, np.array([[(x - radius, y), (x + radius, y)]]), part.color)
+    else:
+        _draw_dot(canvas, x, y, radius, part.color, 2 if part.sample == "ring" else -1)
 
 
 def _draw_target(base: Picture, scale: int, target: Target) -> Picture:

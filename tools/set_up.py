@@ -35,6 +35,8 @@ SOURCE_NEEDS = ("setuptools", "wheel")
 # setuptools comes with the environment of Python 3.11. The other one comes from an older .venv: two distributions of
 # OpenCV in one environment overwrite each other.
 NOT_NEEDED = ("setuptools", "opencv-python-headless")
+# Programs of the package cmake that no build starts: 44 MB.
+NOT_STARTED = ("ctest", "cpack")
 
 
 class SetUpError(Exception):
@@ -66,10 +68,18 @@ def make_base(install: Installer, zig: bool) -> None:
     require_python()
     print("Setting up .venv (once)", flush=True)
     step("environment", run, sys.executable, "-m", "venv", VENV)
-    step("build tools", install.packages, *BUILD_NEEDS, *(["ziglang"] if zig else []))
+    step("build tools", install_build_tools, install, zig)
     succeeds(PYTHON, "-m", "pip", "uninstall", "--yes", *NOT_NEEDED)
     step("libraries", install.packages, *requirements())
     step("native modules, compiled", install_editable, zig)
+
+
+def install_build_tools(install: Installer, zig: bool) -> None:
+    """What compiles, without the programs that only test and pack."""
+    install.packages(*BUILD_NEEDS, *(["ziglang"] if zig else []))
+    for name in NOT_STARTED:
+        for path in VENV.glob(f"lib/*/site-packages/cmake/data/bin/{name}"):
+            path.unlink()
 
 
 def require_python() -> None:

@@ -130,7 +130,7 @@ class Design(Parameters):
             **{f"{finding.severity} {i}": str(finding) for i, finding in enumerate(report.findings, 1)},
         }
         cells = "".join(f"<tr><th>{name}</th><td>{escape(text)}</td></tr>" for name, text in rows.items())
-        drawing = self.layout.to_svg().partition("\n")[2]
+        drawing = self.layout._repr_svg_().partition("\n")[2]
         return f"<div><b>{escape(self.name or self.pattern)}</b><br>{drawing}<table>{cells}</table></div>"
 
 

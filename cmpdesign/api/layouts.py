@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +15,8 @@ from cmpdesign.layout.build import build_layout as build
 
 if TYPE_CHECKING:
     from extractor import LayoutLike, Reference
+
+NOTEBOOK_PX = 420  # longer side of a drawing in a notebook
 
 
 class Layout(layouts.Layout):
@@ -69,7 +72,14 @@ class Layout(layouts.Layout):
         return layout_to_svg(self)
 
     def _repr_svg_(self) -> str:
-        return self.to_svg()
+        """The pattern as SVG in a size that can be seen in notebooks."""
+        scale = NOTEBOOK_PX / max(self.size_mm)
+        return re.sub(
+            r'\b(width|height)="([\d.]+)mm"',
+            lambda side: f'{side[1]}="{float(side[2]) * scale:.0f}"',
+            self.to_svg(),
+            count=2,
+        )
 
 
 def build_layout(design: Parameters) -> Layout:

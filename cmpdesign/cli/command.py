@@ -26,6 +26,14 @@ from cmpdesign.inputs.texts import visible
 from cmpdesign.libraries import missing_library_text
 
 INTERRUPTED = "interrupted; every file that was written is complete"
+# The commands by what people do, in the order of the help text and of the reference.
+PURPOSES = {
+    "Design and make": "templates init studio size check build kerf",
+    "Read and follow": "verify track reconstruct calibrate",
+    "Try before making": "render evaluate",
+    "Make data sets": "dataset extract export",
+    "For other programs": "schema",
+}
 _ARGUMENT_TYPE = re.compile(r"^(  [A-Z]+)( <[^>]+>)", re.MULTILINE)
 _OUTPUT_PARAMETERS = output_parameters()
 
@@ -93,7 +101,20 @@ class Group(TyperGroup):
 
 
 class OneLineErrors(Group):
-    """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130."""
+    """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130.
+
+    The help text has the commands by ``PURPOSES``.
+    """
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        widest = max(map(len, self.commands))
+        for purpose, names in PURPOSES.items():
+            commands = [self.commands[name] for name in names.split()]
+            texts = [each.get_short_help_str(formatter.width - 6 - widest) for each in commands]
+            with formatter.section(purpose):
+                formatter.write_dl(
+                    list(zip((f"{name:{widest}}" for name in names.split()), texts, strict=True))
+                )
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         # for errors in the command line, before the options are known

@@ -55,6 +55,15 @@ def commented_toml(extends: str | None = None) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
+def design_toml(fields: Mapping[str, Any]) -> str:
+    """The text of a design file with the given fields alone; tables are mappings."""
+    lines = [f"{name} = {_toml(value)}" for name, value in fields.items() if not isinstance(value, Mapping)]
+    for name, table in fields.items():
+        if isinstance(table, Mapping) and table:
+            lines += ["", f"[{name}]", *(f"{inner} = {_toml(value)}" for inner, value in table.items())]
+    return "\n".join(lines) + "\n"
+
+
 def _field_lines(name: str, info: FieldInfo, given: Mapping[str, Any]) -> list[str]:
     """The comment of a field, the line of the field, and a blank line."""
     facts = [fact for fact in (_unit_text(name), _values_text(name, info), _default_text(info)) if fact]

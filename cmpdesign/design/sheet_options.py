@@ -61,6 +61,9 @@ class SheetOptions(BaseModel):
     bleed_mm: LengthOrZero = Field(
         2.0, description="Width of the black ground that is printed beyond the cut."
     )
+    dot_gain_mm: LengthOrZero = Field(
+        0.02, description="Width by which the black spreads into the cells, for the pad as made; assumed."
+    )
     ruler: bool = Field(
         False,
         strict=True,

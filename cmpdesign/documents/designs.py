@@ -110,6 +110,14 @@ class TemplateDocument(Document):
     text: str = Field(description="The TOML file.")
 
 
+class StudioDocument(Document):
+    """The page that ``studio`` serves; printed when the page can be opened."""
+
+    format: Literal["cmp-studio"] = "cmp-studio"
+    version: Literal[1] = 1
+    address: str = Field(description="Address of the page on this machine, with the token of this run.")
+
+
 class InitDocument(Document):
     """The design file that ``init`` wrote."""
 

@@ -19,6 +19,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "templates": (designs.TemplatesDocument, designs.TemplateDocument),
     "init": (designs.InitDocument,),
     "size": (designs.SizeDocument,),
+    "studio": (designs.StudioDocument,),
     "build": (designs.BuildDocument,),
     "check": (designs.CheckDocument,),
     "render": (runs.RenderDocument,),

@@ -171,7 +171,7 @@ class Proposal:
         cells = "".join(
             f"<tr><th>{name}</th><td>{escape(text)}</td></tr>" for name, text in self.figures().items()
         )
-        return f"<div>{self.design.layout.to_svg().partition(chr(10))[2]}<table>{cells}</table></div>"
+        return f"<div>{self.design.layout._repr_svg_().partition(chr(10))[2]}<table>{cells}</table></div>"
 
 
 _PARAMETERS = (

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 Picture = NDArray[np.uint8]
 
 EMPTY_SIZE = (640, 480)  # (width, height) of the video when its first frame has no image, px
-ARROW_BGR = (255, 200, 0)
-WHITE_BGR = (255, 255, 255)
+WAY_BGR = (255, 200, 0)
 FIXED_BITS = 4  # OpenCV draws with 4 fractional bits
 
 
@@ -65,7 +64,7 @@ class OverlayWriter:
 def draw_frame(
     image: NDArray[Any] | None, reference: Reference, frame: Tracked, rest: Rest | None, size: tuple[int, int]
 ) -> Picture:
-    """Draw a frame: gridlines, markers by status, arrows from the places at rest, and a caption.
+    """Draw a frame: gridlines, markers by status, lines from the places at rest, and captions.
 
     Args:
         image: (H, W, 3) BGR; None for a frame without an image.
@@ -77,15 +76,17 @@ def draw_frame(
     Returns:
         (H, W, 3) uint8 BGR.
     """
-    from extractor.draw import draw_markers
+    from extractor.draw import CaptionPart, draw_caption, draw_markers
 
+    parts = [CaptionPart(_frame_text(frame))]
     if image is None:
         picture = np.zeros((size[1], size[0], 3), np.uint8)
     else:
         picture = draw_markers(image, reference, frame.markers)
         if rest is not None:
-            _draw_arrows(picture, rest.xy_px, frame.markers.xy_px, picture.shape[1] // image.shape[1])
-    _draw_caption(picture, _frame_text(frame))
+            _draw_ways(picture, rest.xy_px, frame.markers.xy_px, picture.shape[1] // image.shape[1])
+            parts.append(CaptionPart("way from the place at rest", WAY_BGR, "line"))
+    draw_caption(picture, parts, at_top=True)
     return picture
 
 
@@ -96,7 +97,7 @@ def _frame_text(frame: Tracked) -> str:
     return f"frame {frame.index}{time}  {frame.status.name.lower().replace('_', ' ')}{start}{reason}"
 
 
-def _draw_arrows(
+def _draw_ways(
     picture: Picture, rest_px: NDArray[np.float64], xy_px: NDArray[np.float64], scale: int
 ) -> None:
     import cv2
@@ -104,17 +105,7 @@ def _draw_arrows(
     ends = np.stack([rest_px, xy_px], axis=1)
     known = np.isfinite(ends).all(axis=(1, 2))
     fixed = np.round(((ends[known] + 0.5) * scale - 0.5) * (1 << FIXED_BITS)).astype(np.int32)
-    cv2.polylines(picture, list(fixed), False, ARROW_BGR, 1, cv2.LINE_AA, FIXED_BITS)
-
-
-def _draw_caption(picture: Picture, text: str) -> None:
-    import cv2
-
-    size = float(np.clip(picture.shape[1] / 1600, 0.4, 1.0))
-    cv2.rectangle(picture, (0, 0), (picture.shape[1], round(34 * size)), (25, 25, 25), -1)
-    origin = (round(12 * size), round(23 * size))
-    ascii_text = text.encode("ascii", "replace").decode()
-    cv2.putText(picture, ascii_text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, WHITE_BGR, 1, cv2.LINE_AA)
+    cv2.polylines(picture, list(fixed), False, WAY_BGR, 1, cv2.LINE_AA, FIXED_BITS)
 
 
 def _letterbox(picture: Picture, size: tuple[int, int]) -> Picture:

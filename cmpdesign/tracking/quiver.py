@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.products.drawing.svg import scale_length_mm
+
 if TYPE_CHECKING:
     from extractor.layout.reference import Reference
     from extractor.track.displacement import Rest
@@ -17,6 +19,7 @@ Picture = NDArray[np.uint8]
 SIDE_PX = 1000  # the longer side of the drawing
 MARGIN_PX = 60
 FOOT_PX = 70
+BAR_PX = 300
 LONGEST_EDGES = 1.5  # length of the longest arrow (about), in median edges
 NOISE_EDGES = 0.15  # largest length of an arrow of the noise's standard deviation, in median edges
 NOISE_BGR = (60, 60, 200)
@@ -29,8 +32,8 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
     """Draw the gridlines at rest and an arrow for every marker with a displacement.
 
     Arrows have the direction of the image. They are magnified by the integer factor in the caption and colored by
-    their length. A circle beside the caption has the radius of the noise, magnified like the arrows; noise alone is
-    not magnified to visible arrows.
+    their length. The legend has the colors, an arrow of a round length, and a circle with the radius of the noise,
+    both magnified like the arrows; noise alone is not magnified to visible arrows.
 
     Returns:
         (H, W, 3) uint8 BGR.
@@ -54,6 +57,7 @@ def draw_quiver(reference: Reference, rest: Rest, frame: Tracked) -> Picture:
     for start, tip, color in zip(points[known], tips, colors, strict=True):
         _draw_arrow(canvas, start, tip, tuple(int(c) for c in color))
     _draw_footer(canvas, frame, largest, magnification)
+    _draw_scale_arrow(canvas, largest, scale * magnification)
     _draw_noise(canvas, noise_px, noise_px * scale * magnification)
     return canvas
 
@@ -107,13 +111,27 @@ def _draw_footer(canvas: Picture, frame: Tracked, largest_px: float, magnificati
     height, width = canvas.shape[:2]
     bar = cv2.applyColorMap(np.arange(256, dtype=np.uint8)[None], cv2.COLORMAP_VIRIDIS)
     top, left = height - FOOT_PX + 15, MARGIN_PX
-    right = min(left + 300, width - MARGIN_PX)
+    right = min(left + BAR_PX, width - MARGIN_PX)
     canvas[top : top + 14, left:right] = cv2.resize(bar, (right - left, 14))
     mm = np.linalg.norm(frame.displacement_mm, axis=1)
     largest_mm = f" = {np.nanmax(mm):.4g} mm" if np.isfinite(mm).any() else ""
-    text = f"0 to {largest_px:.3g} px{largest_mm}; arrows x {magnification}; frame {frame.index}"
+    text = f"0 to {largest_px:.3g} px{largest_mm}; arrows x {magnification} from rest (gray); frame {frame.index}"
     baseline = (left, top + 42)
     cv2.putText(canvas, text, baseline, cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT_BGR, 1, cv2.LINE_AA)
+
+
+def _draw_scale_arrow(canvas: Picture, largest_px: float, magnified: float) -> None:
+    """Draw an arrow of a round length in image pixels beside the colors; ``magnified`` is its scale in the drawing."""
+    import cv2
+
+    if not largest_px * magnified >= 1:
+        return
+    length_px = scale_length_mm(2 * largest_px)
+    start = np.array([MARGIN_PX + BAR_PX + 40.0, canvas.shape[0] - FOOT_PX + 22.0])
+    tip = start + (length_px * magnified, 0)
+    _draw_arrow(canvas, start, tip, TEXT_BGR)
+    place = (round(tip[0]) + 10, round(tip[1]) + 6)
+    cv2.putText(canvas, f"{length_px:g} px", place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, TEXT_BGR, 1, cv2.LINE_AA)
 
 
 def _draw_noise(canvas: Picture, noise_px: float, radius: float) -> None:
@@ -124,7 +142,7 @@ def _draw_noise(canvas: Picture, noise_px: float, radius: float) -> None:
     x, y = width - MARGIN_PX - 20, height - FOOT_PX // 2
     fixed = 1 << FIXED_BITS
     cv2.circle(canvas, (x * fixed, y * fixed), round(radius * fixed), NOISE_BGR, 1, cv2.LINE_AA, FIXED_BITS)
-    text = f"noise {noise_px:.2g} px"
+    text = f"noise {noise_px:.2g} px (1 sigma)"
     size = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)[0]
     place = (x - size[0] - 25, y + size[1] // 2 - 12)
     cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, NOISE_BGR, 1, cv2.LINE_AA)

@@ -32,7 +32,7 @@ class TrackStatistics:
     """The statistics of a tracker's frames.
 
     Attributes:
-        farthest: the frame with the largest RMS displacement, for the quiver plot.
+        farthest: the frame of the largest displacement, for the quiver plot.
     """
 
     def __init__(self, reference: Reference) -> None:
@@ -46,7 +46,6 @@ class TrackStatistics:
         self._resting: Tracked | None = None
         self._pairs, self._squares, self._values = 0, 0.0, 0
         self._largest = _LargestDisplacement()
-        self._farthest_px = -1.0
         self.farthest: Tracked | None = None
 
     @property
@@ -79,9 +78,7 @@ class TrackStatistics:
         if length[marker] > self._largest.px:
             mm = float(np.linalg.norm(frame.displacement_mm[marker]))
             self._largest = _LargestDisplacement(float(length[marker]), frame.index, marker, mm)
-        rms = float(np.sqrt(np.nanmean(length**2)))
-        if rms > self._farthest_px:
-            self._farthest_px, self.farthest = rms, frame
+            self.farthest = frame
         if np.nanmedian(length) >= AT_REST_PX:
             self._resting = None
             return

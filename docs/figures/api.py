@@ -12,6 +12,25 @@ from typing import Any, is_typeddict
 
 WIDTH = 100  # letters of a signature on one line
 SECTIONS = ("Args", "Attributes", "Keys", "Returns", "Raises", "Yields")
+# Package -> heading -> folders and files of the names below it.
+ROOMS = {
+    "cmpdesign": {
+        "designs and layouts": "designs layouts proposal",
+        "files, workshop and experiments": "layout files products workshop",
+        "pictures": "pictures plots",
+        "sequences": "sequences tracking",
+        "calibration and force": "calibration force",
+        "data sets": "datasets",
+        "errors": "errors",
+    },
+    "extractor": {
+        "reading one picture": "pipeline result quality layout types made",
+        "following": "track",
+        "measuring in space": "space",
+        "force": "contact",
+        "errors": "errors",
+    },
+}
 HEAD = """# Python
 
 <!-- written by python -m docs.figures -->
@@ -29,10 +48,26 @@ def page() -> str:
     for name in ("cmpdesign", "extractor"):
         module = import_module(name)
         names = [each for each in module.__all__ if not each.startswith("__")]
-        parts.append(f"## {name}\n")
-        parts.append(_overview(module, names))
-        parts += [_entry(each, getattr(module, each)) for each in names]
+        for room, members in _rooms(module, names).items():
+            parts.append(f"## {name}: {room}\n")
+            parts.append(_overview(module, members))
+            parts += [_entry(each, getattr(module, each)) for each in members]
     return "\n".join(part.rstrip() + "\n" for part in parts)
+
+
+def _rooms(module: ModuleType, names: list[str]) -> dict[str, list[str]]:
+    """The names by what they are for, in the order of ``ROOMS``; a name of no room is an error of the table."""
+    found: dict[str, list[str]] = {}
+    for room, places in ROOMS[module.__name__].items():
+        found[room] = [each for each in names if _place(module, getattr(module, each)) in places.split()]
+    assert sorted(names) == sorted(each for members in found.values() for each in members)
+    return {room: members for room, members in found.items() if members}
+
+
+def _place(module: ModuleType, found: Any) -> str:
+    """The folder or file of the package where a name is defined: of ``cmpdesign.api`` the file."""
+    words = getattr(found, "__module__", "").removeprefix("cmpdesign.api.").split(".")
+    return words[1] if words[0] == module.__name__ else words[0]
 
 
 def _overview(module: ModuleType, names: list[str]) -> str:

@@ -10,6 +10,7 @@ import typer
 from typer.main import get_command
 
 from cmpdesign.cli import app
+from cmpdesign.cli.command import PURPOSES
 from cmpdesign.cli.options.output import NAMES, output_parameters
 from cmpdesign.documents.document import Message
 from cmpdesign.documents.registry import DOCUMENTS
@@ -53,7 +54,11 @@ def page() -> str:
     """The text of the page."""
     shared = _table("option", [_option_row(parameter) for parameter in output_parameters()])
     parts = [HEAD.format(shared=shared, message=_fields(Message.model_json_schema()))]
-    parts += [_section(words, command) for words, command in _commands(get_command(app), ())]
+    sections = list(_commands(get_command(app), ()))
+    for purpose, names in PURPOSES.items():
+        parts.append(f"## {purpose}\n")
+        for name in names.split():
+            parts += [_section(words, command) for words, command in sections if words[0] == name]
     return "\n".join(part.rstrip() + "\n" for part in parts)
 
 
@@ -71,7 +76,7 @@ def _section(words: tuple[str, ...], command: Any) -> str:
     arguments = [_argument_row(each) for each in own if each.param_type_name == "argument"]
     options = [_option_row(each) for each in own if each.param_type_name == "option"]
     name = " ".join(words)
-    lines = [f"## {name}", "", re.sub(r"(?<!\n)\n(?!\n)", " ", command.help.strip()), ""]
+    lines = [f"### {name}", "", re.sub(r"(?<!\n)\n(?!\n)", " ", command.help.strip()), ""]
     if arguments:
         lines += [_table("argument", arguments), ""]
     if options:

@@ -16,7 +16,7 @@ SUFFIXES = {".svg", ".json", ".png", ".step", ".stl", ".glb", ".3mf", ".html", "
 
 
 def test_every_format_is_the_same_in_another_process(tmp_path: Path) -> None:
-    arguments = ["build", "honeycomb", "--set", "layers=1", "--set", "mold.vents=3"]
+    arguments = ["build", "honeycomb", "--set", "layers=2", "--set", "mold.vents=3"]
     arguments += ["--only", "svg,layout,preview,mold,mesh,print,report", "-o"]
     code = "from cmpdesign.cli import main; main()"
     there = subprocess.Popen(

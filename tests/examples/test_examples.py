@@ -64,10 +64,10 @@ def test_an_example_takes_files(tmp_path: Path) -> None:
     assert "331 of 331" in printed and list((tmp_path / "other").iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["read_one_picture", "follow_a_video", "plot_a_recording"])
+@pytest.mark.parametrize("name", [name for name, (_, files) in RUN.items() if files])
 def test_an_example_overwrites_no_file(name: str, tmp_path: Path) -> None:
     """A folder of the user's with the example's name: one line, and no file changes."""
-    for folder in ("example", "plotted"):
+    for folder in {file.partition("/")[0] for _, files in RUN.values() for file in files}:
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "layout.json").write_text("mine", encoding="utf-8")
     done = subprocess.run(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
 import cv2
@@ -24,6 +24,7 @@ from extractor import (
     VirtualStatus,
     parse_layout,
 )
+from extractor.draw import STATUS_BGR, draw_markers
 from tests.support.layouts import PATTERNS, small_layout, small_text
 from tests.support.pictures import (
     STRANGE,
@@ -70,6 +71,19 @@ def assert_nothing(markers: Markers, *reasons: Reason) -> None:
     assert (markers.status == Status.LOST).all() and (markers.virtual_status == VirtualStatus.LOST).all()
     assert np.isnan(markers.virtual_xy_px).all()
     assert markers.mirrored is None
+
+
+def test_the_legend_has_the_color_of_every_status_that_is_drawn() -> None:
+    """The strip at the bottom, which has no markers."""
+    seen = picture()
+    markers = extractor().extract(seen.image)
+    status = markers.status.copy()
+    status[5] = Status.REPAIRED
+    reference = parse_layout(small_text("honeycomb", 4))
+    drawn = draw_markers(seen.image, reference, replace(markers, status=status))
+    strip = drawn[-round(34 * drawn.shape[1] / 1600) :]
+    shown = [one for one, color in STATUS_BGR.items() if (strip == color).all(axis=2).any()]
+    assert shown == [Status.MEASURED, Status.REPAIRED]
 
 
 @pytest.mark.parametrize("pattern", TRIANGULAR)

@@ -93,7 +93,7 @@ def read_pad(pad: MadePad, camera_px: tuple[int, int] = CAMERA_PX, preset: Prese
     from cmpdesign.scene import Camera, Optics, Plain, Scene, render
     from extractor import Extractor, Status, parse_layout
 
-    nominal, camera_turn_deg, scale = pad.nominal, *_view_of(pad.nominal, camera_px)
+    nominal, camera_turn_deg, scale = pad.nominal, *filling_view(pad.nominal, camera_px)
     pitch_mm = float(nominal.parameters["pitch_mm"])
     camera = Camera(scale * pitch_mm, camera_turn_deg)
     scene = Scene(pad.layout, camera, optics=Optics(BLUR_PX))
@@ -181,7 +181,7 @@ def clip_findings(layout: Layout, camera_px: tuple[int, int] = CAMERA_PX) -> lis
     return [Finding(subject, reading.share, MIN_SHARE, "", remedy, "error")]
 
 
-def _view_of(layout: Layout, camera_px: tuple[int, int]) -> tuple[float, float]:
+def filling_view(layout: Layout, camera_px: tuple[int, int]) -> tuple[float, float]:
     """Turn in degrees and scale in px per mm at which the pad fills the picture best."""
     width, height = layout.size_mm
     upright = min(camera_px[0] / width, camera_px[1] / height)

@@ -53,7 +53,7 @@ def layout_to_svg(layout: Layout, *, ids: bool = False, scale: bool = False, mir
 
     width, height = layout.size_mm
     sheet_height = round(height + (SCALE_STRIP_MM if scale else 0.0), DECIMALS)
-    to_sheet = _sheet_from_layout(layout, mirror)
+    to_sheet = sheet_from_layout(layout, mirror)
     drawing = svgwrite.Drawing(
         size=(f"{width!r}mm", f"{sheet_height!r}mm"),
         viewBox=f"0 0 {width!r} {sheet_height!r}",
@@ -75,7 +75,28 @@ def layout_to_svg(layout: Layout, *, ids: bool = False, scale: bool = False, mir
     return f'<?xml version="1.0" encoding="utf-8" ?>\n{drawing.tostring()}\n'
 
 
-def _sheet_from_layout(layout: Layout, mirror: bool) -> SheetMap:
+def layout_to_compact_svg(layout: Layout, *, mirror: bool = False) -> str:
+    """The pattern for a screen: the same coordinates as in ``layout_to_svg``, with one path a color.
+
+    Args:
+        layout, mirror: see ``layout_to_svg``.
+    """
+    width, height = layout.size_mm
+    to_sheet = sheet_from_layout(layout, mirror)
+    xy = to_sheet(layout.marker_xy_mm)
+    rings = {COLORS[BLACK]: [to_sheet(layout.outline_mm).tolist()]}
+    for color, name in enumerate(COLORS):
+        if color != BLACK:
+            rings[name] = xy[layout.cell_corners[layout.cell_color == color]].tolist()
+    paths = "".join(
+        f'<path class="{name}" fill="{layout.palette[name]}" d="{"".join(map(_closed_path, of_color))}"/>'
+        for name, of_color in rings.items()
+    )
+    return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width!r} {height!r}">{paths}</svg>\n'
+
+
+def sheet_from_layout(layout: Layout, mirror: bool) -> SheetMap:
+    """The map of (N, 2) points, mm, from the layout's frame to the drawing's: x right, y down, from its top left."""
     left = layout.outline_mm[:, 0].min()
     right, top = layout.outline_mm.max(axis=0)
 

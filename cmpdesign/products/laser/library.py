@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Generic, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from cmpdesign.design.quantities import Length, LengthOrZero
 from cmpdesign.design.templates import templates_folder
@@ -15,8 +15,8 @@ from cmpdesign.inputs.documents import read_toml
 from cmpdesign.inputs.files import path_exists
 from cmpdesign.inputs.names import Line, Name, nearest_name
 from cmpdesign.inputs.validation import validation_message
+from cmpdesign.products.materials.sourced import Sourced, StrictModel, assumed
 
-Value = TypeVar("Value")
 Model = TypeVar("Model", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 Percent = Annotated[float, Field(gt=0, le=100)]
@@ -24,18 +24,7 @@ Lean = Annotated[float, Field(gt=-45, lt=45)]
 Count = Annotated[int, Field(ge=1, le=200, strict=True)]
 
 
-class _StrictModel(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Sourced(_StrictModel, Generic[Value]):
-    """A value with its source: a reference, a measurement, or "assumed"."""
-
-    value: Value
-    source: Annotated[Line, Field(min_length=3)]
-
-
-class Machine(_StrictModel):
+class Machine(StrictModel):
     """A laser machine; ``s_max`` is the S word of full power (GRBL's $30)."""
 
     name: Name
@@ -50,7 +39,7 @@ class Machine(_StrictModel):
     acceleration_mm_s2: Sourced[Positive]
 
 
-class Settings(_StrictModel):
+class Settings(StrictModel):
     """The settings of one machine for one material.
 
     Kerf is the full width at the front: ``kerf_x_mm`` of cuts along y, ``kerf_y_mm`` of cuts along x. The settings of
@@ -68,12 +57,17 @@ class Settings(_StrictModel):
     pocket_depth_per_pass_mm: Sourced[Length] | None = None
 
 
-class Material(_StrictModel):
-    """A silicone sheet, with the settings of each machine that can carve it."""
+class Material(StrictModel):
+    """A silicone sheet, with the settings of each machine that can carve it.
+
+    ``chemistry`` is that of the sheet; ``fill_silicone`` names the silicone that fills the cavities, or its TOML file.
+    """
 
     name: Name
     thickness_mm: Sourced[Length]
     minimum_web_mm: Sourced[LengthOrZero]
+    chemistry: Sourced[Literal["platinum", "tin"]] = assumed("platinum")
+    fill_silicone: Sourced[Line] = assumed("ecoflex-00-30")
     fill: Line
     cure: Line
     fumes: Line

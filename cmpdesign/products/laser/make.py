@@ -1,10 +1,11 @@
-"""The product "laser": a file per pass and one of all passes in four formats, job sheet, coupon, as-made.svg."""
+"""The product "laser": a file per pass and one of all passes in four formats, sheets, coupon, grid, as-made.svg."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
 from cmpdesign.design.design import Design
+from cmpdesign.files.images import to_png
 from cmpdesign.layout.layout import Layout
 from cmpdesign.products.as_made.made_pad import MadePad
 from cmpdesign.products.laser.as_made import made_pad, measure_as_made
@@ -20,7 +21,11 @@ from cmpdesign.products.laser.formats.svg import drawing_to_svg
 from cmpdesign.products.laser.grid.job import grid_job
 from cmpdesign.products.laser.job import make_job
 from cmpdesign.products.laser.job_sheet import job_sheet_html
+from cmpdesign.products.laser.process_sheet import bill_of_materials, pass_pictures, process_sheet
 from cmpdesign.products.laser.setup import complete_setup
+from cmpdesign.products.process_sheet.html import sheet_to_html
+from cmpdesign.products.process_sheet.pdf import sheet_to_pdf
+from cmpdesign.products.process_sheet.steps import materials_csv
 from cmpdesign.products.registry import ProductFiles
 from cmpdesign.watch import tell
 
@@ -71,6 +76,12 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
         tell(2 + number, drawn + 3)
     files[f"{FOLDER}/as-made.svg"] = as_made_svg(job)
     files[f"{FOLDER}/job-sheet.html"] = job_sheet_html(job, figures, timings, drawings["coupon"])
+    pictures = {name: to_png(picture) for name, picture in pass_pictures(job).items()}
+    files |= {f"{FOLDER}/pictures/{name}.png": png for name, png in pictures.items()}
+    sheet = process_sheet(job, timings, tuple(map(str, warnings)))
+    files[f"{FOLDER}/process-sheet.html"] = sheet_to_html(sheet, "pictures")
+    files[f"{FOLDER}/process-sheet.pdf"] = sheet_to_pdf(sheet, pictures)
+    files[f"{FOLDER}/materials.csv"] = materials_csv(bill_of_materials(job))
     made = ProductFiles(files, job_figures(job, figures, timings), warnings, made_pad=made_pad(job))
     tell(drawn + 3, drawn + 3)
     return made

@@ -11,11 +11,11 @@ from cmpdesign.products.laser.library import (
     Machine,
     Material,
     Settings,
-    Sourced,
     load_machine,
     load_material,
     settings_on,
 )
+from cmpdesign.products.materials.sourced import Sourced
 
 # Default spacing of lines and rings, as a share of the kerf at the bottom: no ridge can stay.
 HATCH_SHARE = 0.5

@@ -11,11 +11,12 @@ _STYLE = """
 body { font: 11pt/1.45 system-ui, sans-serif; color: #1c1a18; max-width: 182mm; margin: 8mm auto }
 h1 { font-size: 18pt; margin: 0 0 2mm } h2 { font-size: 14pt; margin: 8mm 0 2mm; border-bottom: .3mm solid }
 section { break-before: page } table { border-collapse: collapse; margin: 3mm 0 }
-td, th { text-align: left; padding: .9mm 2.5mm; border-bottom: .15mm solid #bbb; vertical-align: top }
+td, th { text-align: left; padding: .6mm 2.5mm; border-bottom: .15mm solid #bbb; vertical-align: top }
 ul { list-style: none; padding: 0 } li { margin: 1.6mm 0; padding-left: 8mm; text-indent: -8mm }
 li::before { content: "\\2610"; display: inline-block; width: 8mm; text-indent: 0; font-size: 13pt; line-height: 1 }
 .warn { border: .5mm solid #b3261e; padding: 2mm 3mm; margin: 3mm 0 } img { max-width: 60mm; margin: 0 3mm 2mm 0 }
-img.whole { max-width: 100%; max-height: 110mm } small { color: #5c5650 }
+@media print { body { margin: 0 } table { font-size: 9.5pt } }
+img.whole { max-width: 100%; max-height: 60mm } small { color: #5c5650 }
 """
 
 

@@ -16,6 +16,7 @@ from cmpdesign.libraries import extra
 
 DECIMALS = 6
 POINTS_PER_MM = 72 / 25.4
+EM_PER_LETTER = 0.56  # width of the mean letter of Helvetica, in units of its height
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +41,22 @@ class TextLine:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """A page and its shapes in the order of drawing."""
+    """A page and its shapes in the order of drawing.
+
+    ``trim_mm`` and ``bleed_mm`` are the corners (4, 2) of the rectangles that are cut out and that are printed.
+    """
 
     width_mm: float
     height_mm: float
     title: str
     items: Sequence[FilledPolygons | TextLine]
+    trim_mm: NDArray[np.float64] | None = None
+    bleed_mm: NDArray[np.float64] | None = None
+
+
+def fitted_size_mm(texts: Sequence[str], room_mm: float, most_mm: float) -> float:
+    """The height of letters, at most ``most_mm``, with which the longest text is as wide as the room."""
+    return min(most_mm, room_mm / (EM_PER_LETTER * max(map(len, texts))))
 
 
 def rectangle_points(left: float, top: float, width: float, height: float) -> NDArray[np.float64]:
@@ -83,17 +94,30 @@ def _svg_text(drawing: Any, item: TextLine) -> Any:
     return drawing.text(item.text, transform=f"translate({item.x_mm} {item.y_mm}) rotate(-90)", **style)
 
 
-def page_to_pdf(page: Page) -> bytes:
-    """Format the page as PDF at true size, without a date: the same bytes for the same page."""
+def pages_to_pdf(*pages: Page) -> bytes:
+    """Format pages as PDF at true size, without a date: the same bytes for the same pages."""
     with extra("print"):
-        from reportlab.lib.colors import HexColor
         from reportlab.pdfgen.canvas import Canvas
 
     result = io.BytesIO()
-    size = (page.width_mm * POINTS_PER_MM, page.height_mm * POINTS_PER_MM)
     with _no_date_of_environment():
-        canvas = Canvas(result, pagesize=size, invariant=1)
-    canvas.setTitle(page.title)
+        canvas = Canvas(result, invariant=1)
+    canvas.setTitle(pages[0].title)
+    for page in pages:
+        _draw_pdf_page(canvas, page)
+    canvas.save()
+    return result.getvalue()
+
+
+def _draw_pdf_page(canvas: Any, page: Page) -> None:
+    with extra("print"):
+        from reportlab.lib.colors import HexColor
+
+    canvas.setPageSize((page.width_mm * POINTS_PER_MM, page.height_mm * POINTS_PER_MM))
+    for name, box in (("trim", page.trim_mm), ("bleed", page.bleed_mm)):
+        if box is not None:
+            points = np.stack([box[:, 0], page.height_mm - box[:, 1]], axis=1) * POINTS_PER_MM
+            canvas.setCropBox((*points.min(axis=0).tolist(), *points.max(axis=0).tolist()), name)
     # From here on coordinates are in mm, y up.
     canvas.scale(POINTS_PER_MM, POINTS_PER_MM)
     for item in page.items:
@@ -110,8 +134,6 @@ def page_to_pdf(page: Page) -> bytes:
             path.close()
         canvas.drawPath(path, stroke=0, fill=1)
     canvas.showPage()
-    canvas.save()
-    return result.getvalue()
 
 
 @contextmanager

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,20 +9,29 @@ from cmpdesign.design.design import Design
 from cmpdesign.design.sheet_options import SheetOptions, page_size_mm
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
+from cmpdesign.layout.measures import cell_widths_mm
 from cmpdesign.layout.outline import corner_offsets
-from cmpdesign.layout.side import seen_side
 from cmpdesign.libraries import extra
-from cmpdesign.patterns.colors import BLACK, COLORS
-from cmpdesign.products.as_made.made_pad import MadePad, make_pad
+from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.as_made.made_pad import Cause, MadePad, make_pad
 from cmpdesign.products.registry import ProductFiles
+from cmpdesign.products.sheet.film import film_pages
 from cmpdesign.products.sheet.key import BAR_MM, CODE_MM, THICK_MM, X_BAR, Y_BAR, SheetKey
 from cmpdesign.products.sheet.page import (
     FilledPolygons,
     Page,
     TextLine,
-    page_to_pdf,
+    fitted_size_mm,
     page_to_svg,
+    pages_to_pdf,
     rectangle_points,
+)
+from cmpdesign.products.sheet.printed_pad import (
+    bleed_outline,
+    crop_mark_polygons,
+    crop_marks,
+    pad_items,
+    print_side,
 )
 from cmpdesign.products.sheet.ruler import RULER_MM, ruler_items
 
@@ -32,22 +39,22 @@ FOLDER = "print"
 INK, PAPER = "#000000", "#ffffff"
 # Margin for the printer's grip; further margin at the left and the bottom, for the key.
 MARGIN_MM, KEY_LEFT_MM, KEY_BOTTOM_MM = 10.0, 10.0, 32.0
-CROP_MM, CROP_APART_MM, HAIRLINE_MM = 4.0, 0.5, 0.1
-# Sine of the least turn of a corner with crop marks: 30 to 150 degrees.
-SHARP = 0.5 - 1e-9
 PATCH_MM, FRAME_MM = 6.0, 0.2
+PATCH_STEP_MM = 9.0, 14.0  # from patch to patch: smallest, for the text below, and usual
+TEXT_MM = 2.6
 Points = NDArray[np.float64]
 
 
 def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
-    """Make ``print/sheet.svg`` and ``print/sheet.pdf``.
+    """Make ``print/sheet.svg``, ``print/sheet.pdf`` and ``print/film.pdf``.
 
     Raises:
         DesignError: no pad fits on the page, or fewer pads fit than the design states.
     """
     page, pads = make_print_page(design, layout)
     files: dict[str, str | bytes] = {f"{FOLDER}/sheet.svg": page_to_svg(page)}
-    files[f"{FOLDER}/sheet.pdf"] = page_to_pdf(page)
+    files[f"{FOLDER}/sheet.pdf"] = pages_to_pdf(page)
+    files[f"{FOLDER}/film.pdf"] = pages_to_pdf(*film_pages(design, layout))
     side = print_side(design)
     figures = {
         "pads": pads,
@@ -60,40 +67,20 @@ def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
 
 
 def made_pad(design: Design, layout: Layout) -> MadePad:
-    """The pad as printed: nominal cells."""
-    return make_pad(layout, "print", list(layout.colored_outlines_mm))
+    """The pad as printed: the black ground spreads into every cell.
 
-
-class PrintSide(NamedTuple):
-    """The print of a pad on a film.
-
-    Attributes:
-        film: "opaque": the camera sees the print directly; "clear": through the film.
-        seen: the side of the pattern that the camera sees.
-        mirror: the page shows the pattern mirrored.
-        text: one line for the page.
+    Raises:
+        DesignError: nothing of a cell stays.
     """
-
-    film: str
-    seen: str
-    mirror: bool
-    text: str
-
-
-def print_side(design: Design) -> PrintSide:
-    """The film, the printed side and the mirroring of a design.
-
-    The print is as seen by the camera if the camera sees the ink directly, and mirrored if the camera sees the ink
-    through the film.
-    """
-    seen = seen_side(design.mirrored)
-    film = design.sheet.film or ("opaque" if seen == "front" else "clear")
-    mirror = (seen == "back") != (film == "clear")
-    text = f"camera sees the {seen}: "
-    text += "print on the side that faces it" if film == "opaque" else "print on the far side of a clear film"
-    if design.print_mirror:
-        mirror, text = not mirror, f"{text}, by transfer"
-    return PrintSide(film, seen, mirror, text)
+    gain_mm = design.sheet.dot_gain_mm
+    free_mm = float(cell_widths_mm(layout)[layout.colored_cells].min()) / 2
+    if gain_mm >= free_mm:
+        raise DesignError(
+            f"sheet.dot_gain_mm = {gain_mm:g}: the ink closes cells, whose smallest inner radius is {free_mm:.3g} mm; "
+            "make pitch_mm larger"
+        )
+    cells = [ring - gain_mm * corner_offsets(ring) for ring in layout.colored_outlines_mm]
+    return make_pad(layout, "print", cells, (Cause("sheet.dot_gain_mm", gain_mm),))
 
 
 def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
@@ -105,13 +92,13 @@ def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
         FilledPolygons([rectangle_points(0, 0, width, height)], PAPER, "paper")
     ]
     for place in places:
-        items += _pad_items(layout, place, design)
+        items += pad_items(layout, place, design)
     items.append(
         FilledPolygons(
-            [mark for place in places for mark in _fiducial_polygons(layout, place, design)], INK, "crop"
+            [mark for place in places for mark in crop_mark_polygons(layout, place, design)], INK, "crop"
         )
     )
-    items += _key_items(layout, height, print_side(design).text)
+    items += _key_items(layout, width, height, print_side(design).text)
     items += _color_patch_items(layout, width, height)
     if design.sheet.ruler:
         items += ruler_items(MARGIN_MM + KEY_LEFT_MM, height - MARGIN_MM - KEY_BOTTOM_MM, width - MARGIN_MM)
@@ -122,9 +109,7 @@ def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:
 def _pad_places(option: SheetOptions, layout: Layout, width: float, height: float) -> list[Points]:
     """(2,) upper left corner of each pad's bounding box on the page, row by row, mm."""
     low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
-    printed = np.concatenate(
-        [_bleed_outline(layout, option), *crop_marks(layout.outline_mm, option.bleed_mm)]
-    )
+    printed = np.concatenate([bleed_outline(layout, option), *crop_marks(layout.outline_mm, option.bleed_mm)])
     margin = np.maximum(low - printed.min(axis=0), printed.max(axis=0) - high)
     spacing = np.array(layout.size_mm) + 2 * margin
     left, bottom = MARGIN_MM + KEY_LEFT_MM, MARGIN_MM + KEY_BOTTOM_MM + RULER_MM * option.ruler
@@ -148,88 +133,10 @@ def _pad_places(option: SheetOptions, layout: Layout, width: float, height: floa
     return [corner + spacing * (n % columns, n // columns) for n in range(wanted)]
 
 
-def _pad_items(layout: Layout, place: Points, design: Design) -> list[FilledPolygons | TextLine]:
-    """The ground with bleed, then the cells color by color."""
-    ground = _page_from_layout(_bleed_outline(layout, design.sheet), layout, place, design)
-    items: list[FilledPolygons | TextLine] = [FilledPolygons([ground], layout.palette[COLORS[BLACK]])]
-    for color, name in enumerate(COLORS):
-        cells = layout.cell_corners[layout.cell_color == color]
-        if color != BLACK and len(cells):
-            corners = _page_from_layout(layout.marker_xy_mm[cells], layout, place, design)
-            items.append(FilledPolygons(list(corners), layout.palette[name]))
-    return items
-
-
-def _bleed_outline(layout: Layout, option: SheetOptions) -> Points:
-    """(K, 2) the pad's outline, ``bleed_mm`` further out."""
-    outline: Points = layout.outline_mm + option.bleed_mm * corner_offsets(layout.outline_mm)
-    return outline
-
-
-def _fiducial_polygons(layout: Layout, place: Points, design: Design) -> list[Points]:
-    marks = crop_marks(layout.outline_mm, design.sheet.bleed_mm)
-    return [_page_from_layout(mark, layout, place, design) for mark in marks]
-
-
-def _page_from_layout(xy: Points, layout: Layout, place: Points, design: Design) -> Points:
-    """(..., 2) points from the layout's frame to the page; ``place``: corner of the pad, see ``_pad_places``."""
-    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
-    x = high[0] - xy[..., 0] if print_side(design).mirror else xy[..., 0] - low[0]
-    return np.stack([place[0] + x, place[1] + high[1] - xy[..., 1]], axis=-1)
-
-
-def crop_marks(outline_mm: Points, bleed_mm: float) -> list[Points]:
-    """Hairlines that continue the pad's sides beyond the corners; a ruler laid on two hairlines shows the cut.
-
-    The marks of a round or non-convex outline are those of its bounding box.
-
-    Args:
-        outline_mm: (N, 2) counter-clockwise.
-        bleed_mm: width of the bleed; the marks begin ``CROP_APART_MM`` outside the bleed.
-
-    Returns:
-        Two (4, 2) outlines per corner.
-    """
-    corners, sine = outline_mm, _turn_sines(outline_mm)
-    if (sine < SHARP).any():
-        (left, low), (right, high) = outline_mm.min(axis=0), outline_mm.max(axis=0)
-        corners = np.array([(left, low), (right, low), (right, high), (left, high)])
-        sine = np.ones(4)
-    before, after = (
-        _unit_directions(np.roll(corners, 1, axis=0), corners),
-        _unit_directions(np.roll(corners, -1, axis=0), corners),
-    )
-    marks = []
-    # A continued side leaves the bleed of the next side at this distance from the corner.
-    distances = (bleed_mm + CROP_APART_MM) / sine
-    for corner, distance, *directions in zip(corners, distances, before, after, strict=True):
-        marks += [_hairline_polygon(corner + distance * direction, direction) for direction in directions]
-    return marks
-
-
-def _turn_sines(outline: Points) -> Points:
-    """(N,) sine of the angle by which the outline turns to the left at each corner."""
-    before = _unit_directions(np.roll(outline, 1, axis=0), outline)
-    after = _unit_directions(outline, np.roll(outline, -1, axis=0))
-    sines: Points = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return sines
-
-
-def _unit_directions(start: Points, end: Points) -> Points:
-    """(N, 2) unit vectors from start to end."""
-    direction: Points = (end - start) / np.hypot(*(end - start).T)[:, None]
-    return direction
-
-
-def _hairline_polygon(start: Points, direction: Points) -> Points:
-    """(4, 2) corners of a hairline of length ``CROP_MM``."""
-    half = HAIRLINE_MM / 2 * np.array([-direction[1], direction[0]])
-    end = start + CROP_MM * direction
-    return np.array([start - half, end - half, end + half, start + half])
-
-
-def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPolygons | TextLine]:
-    """QR code, scale bars and text, in the lower left corner."""
+def _key_items(
+    layout: Layout, width: float, height: float, side_text: str
+) -> list[FilledPolygons | TextLine]:
+    """QR code, scale bars and text, in the lower left corner; the text stands above the color patches."""
     with extra("print"):
         import segno
 
@@ -258,24 +165,32 @@ def _key_items(layout: Layout, height: float, side_text: str) -> list[FilledPoly
         if layout.code is None
         else f"code {layout.code.id}, digest {layout.digest[:32]}",
         f"{layout.digest[32:]}",
-        f"print at 100 %, not fitted to the page; {side_text}",
+        "print at 100 %, not fitted to the page",
+        side_text,
     )
     items: list[FilledPolygons | TextLine] = [
         FilledPolygons(modules, INK, "code"),
         FilledPolygons([x_bar, y_bar], INK, "scale"),
     ]
-    items += [TextLine(line, text_x, top + 3 + 3.4 * n, 2.6) for n, line in enumerate(lines)]
+    size = fitted_size_mm(lines, width - MARGIN_MM - text_x, TEXT_MM)
+    items += [TextLine(line, text_x, top - 5.6 + 3.2 * n, size) for n, line in enumerate(lines)]
     items.append(TextLine(f"{BAR_MM:g} mm", text_x, top + X_BAR[0][1] + 4, 2.6))
     items.append(TextLine(f"{BAR_MM:g} mm", left + Y_BAR[0][0] - 2, top + Y_BAR[0][1], 2.6, turned=True))
     return items
 
 
 def _color_patch_items(layout: Layout, width: float, height: float) -> list[FilledPolygons | TextLine]:
-    """One patch per color with the color's name and value, in the lower right corner."""
+    """One patch per color with the color's name and value, in the lower right corner; none where the page has no room
+    beside the scale bar.
+    """
     names = [name for number, name in enumerate(COLORS) if (layout.cell_color == number).any()]
     items: list[FilledPolygons | TextLine] = []
+    room_mm = width - 2 * MARGIN_MM - X_BAR[1][0] - 2
+    step_mm = min(PATCH_STEP_MM[1], room_mm / len(names))
+    if step_mm < PATCH_STEP_MM[0]:
+        return items
     for number, name in enumerate(names):
-        x = width - MARGIN_MM - (len(names) - number) * (PATCH_MM + 8)
+        x = width - MARGIN_MM - (len(names) - number) * step_mm
         y = height - MARGIN_MM - PATCH_MM - 6
         frame = rectangle_points(x - FRAME_MM, y - FRAME_MM, PATCH_MM + 2 * FRAME_MM, PATCH_MM + 2 * FRAME_MM)
         items += [

@@ -59,9 +59,12 @@ def pattern() -> Sketch:
         (right - 0.42, -height - 0.75), (right + 0.42, -height - 0.75), "diameter_mm", (right, -4.32)
     )
     sketch.length((width, -height + 0.6), (right - 0.42, -height + 0.6), "gap_mm", (right + 0.4, -2.1))
-    sketch.text(
-        (-0.2, -5.0), "bleed_mm: how far the printed black goes beyond the pad's cut", 12, ACCENT, bold=True
+    texts = (
+        "bleed_mm: how far the printed black goes beyond the pad's cut",
+        "dot_gain_mm: how far the printed black spreads into a cell",
     )
+    for place, text in enumerate(texts):
+        sketch.text((-0.2, -4.8 - 0.3 * place), text, 12, ACCENT, bold=True)
     _clips(sketch)
     return sketch
 

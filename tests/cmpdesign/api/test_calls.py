@@ -35,7 +35,7 @@ CALLS = {
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
 }
-NOT_CALLS = {"init"}  # of files for editors
+NOT_CALLS = {"init", "studio"}  # of files for editors; of a page
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +157,8 @@ def test_values_show_themselves(design: cmpdesign.Design, image: np.ndarray) -> 
         assert len(repr(value)) < 120 and type(value).__name__ in repr(value)
     assert "37 measured, 0 repaired" in repr(markers) and "37 markers" in repr(design.layout)
     assert design.layout._repr_svg_().count("<path") == 1 + len(design.layout.colored_cells)
+    sides = re.findall(r'<svg[^>]*\bheight="(\d+)"[^>]*\bwidth="(\d+)"', design.layout._repr_svg_())
+    assert max(map(int, sides[0])) == 420  # px: legible on a screen, whatever the pad's size
     assert "<svg" in design._repr_html_() and "37" in design._repr_html_()
     assert "<td>37</td>" in markers._repr_html_()
     named = cmpdesign.load("honeycomb", name="<script>")

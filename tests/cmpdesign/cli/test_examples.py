@@ -19,6 +19,7 @@ from tests.support.made.example_files import prepare_files
 
 GROUPS = {"evaluate", "calibrate", "export"}
 SLOW = {"evaluate"}
+SERVERS = {"studio"}  # run until Ctrl-C; tests/cmpdesign/studio runs them
 
 
 def examples(*words: str) -> list[str]:
@@ -32,7 +33,7 @@ def examples(*words: str) -> list[str]:
 def every_example() -> list[Any]:
     found = []
     for name, _ in commands():
-        for line in examples(*name):
+        for line in () if SERVERS & set(name) else examples(*name):
             marks = [pytest.mark.slow] if SLOW & set(name) else []
             found.append(pytest.param(line, marks=marks, id=line))
     return found

@@ -18,7 +18,7 @@ from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.side import seen_side, turned_over
 from cmpdesign.products.as_made.made_pad import cut_by_later, make_pad
 from cmpdesign.products.as_made.reading import read_pad, reading_findings
-from cmpdesign.products.mold.stack.silicones import load_silicone
+from cmpdesign.products.materials.silicones import load_silicone
 from cmpdesign.reading.read_layout import read_layout
 from tests.support.command import run
 from tests.support.made.seen_pads import SeenCell, SeenPad, carved_pad, cast_pad, read_seen

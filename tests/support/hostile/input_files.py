@@ -22,7 +22,7 @@ from cmpdesign.files.resolution import resolution_dpi
 from cmpdesign.products.laser.coupon.design import coupon_to_json, design_coupon, load_coupon
 from cmpdesign.products.laser.library import load_machine, load_material
 from cmpdesign.products.laser.setup import complete_setup
-from cmpdesign.products.mold.stack.silicones import load_silicone
+from cmpdesign.products.materials.silicones import load_silicone
 from cmpdesign.scene import Truth, load_truth, save_truth
 from cmpdesign.scene.files.scene_file import load_scene
 from cmpdesign.tracking.sources import open_source

@@ -11,12 +11,12 @@ import numpy as np
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.materials.silicones import load_silicone, silicones
 from cmpdesign.products.mold.checks.clearances import LEAST_WALL_MM, clearance_findings
 from cmpdesign.products.mold.shapes.bosses import boss_features
 from cmpdesign.products.mold.shapes.cavities import cavities, open_insets, seen_inset_mm
 from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3
 from cmpdesign.products.mold.stack.crown import Crown
-from cmpdesign.products.mold.stack.silicones import load_silicone, silicones
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, crown_edge_mm
 
 

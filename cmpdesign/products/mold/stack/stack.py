@@ -25,9 +25,9 @@ from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.side import seen_side, turned_over
 from cmpdesign.patterns.colors import BLACK, COLORS
+from cmpdesign.products.materials.silicones import Silicone, load_silicone
 from cmpdesign.products.mold.solids.loops import Loop, Points, circle_loop, polygon_loop, rounded_rectangle
 from cmpdesign.products.mold.stack.crown import END_SLOPE, STEEPEST_DEG, Crown, project_on_crown
-from cmpdesign.products.mold.stack.silicones import Silicone, load_silicone
 
 SILICONE_LAYERS = ("base", "marker", "cover")
 # Distance of a crown's foot from the pattern and from the pad's edge.

@@ -8,6 +8,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pypdfium2
 import pytest
 import resvg_py
 import shapely
@@ -19,6 +20,7 @@ from cmpdesign.cli import app
 from cmpdesign.errors import DesignError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.patterns.colors import COLORS
+from cmpdesign.products.laser.as_made import burnt_cell_outlines_mm
 from cmpdesign.products.laser.as_made_svg import as_made_svg
 from cmpdesign.products.laser.checks import count_duplicate_paths, count_open_paths
 from cmpdesign.products.laser.figures import pass_timing
@@ -31,6 +33,7 @@ from cmpdesign.products.laser.paths.order import order_cells, shortest_pause
 from cmpdesign.products.laser.paths.strokes import ragged_strokes
 from cmpdesign.products.laser.paths.timing import move_times_s
 from cmpdesign.products.laser.paths.tour import find_short_tour, tour_length_mm
+from cmpdesign.products.laser.process_sheet import process_sheet, weighings
 from extractor import Extractor, parse_layout
 from tests.support.laser_tools import Points, groups_of, made_job, run_gcode
 
@@ -58,7 +61,20 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
     names = {path.name for path in (tmp_path / "laser").glob("[!.]*")}
     jobs = ["0-holes", "1-red", "2-green", "3-blue", "4-white", "5-outline", "job", "coupon", "grid"]
     expected = {f"{job}.{suffix}" for job in jobs for suffix in ("svg", "dxf", "lbrn2", "gcode")}
-    assert names == expected | {"as-made.svg", "job-sheet.html", "coupon.json", "grid.json"}
+    assert names == expected | {
+        "as-made.svg",
+        "job-sheet.html",
+        "process-sheet.html",
+        "process-sheet.pdf",
+        "materials.csv",
+        "pictures",
+        "coupon.json",
+        "grid.json",
+    }
+    document = pypdfium2.PdfDocument((tmp_path / "laser" / "process-sheet.pdf").read_bytes())
+    pages = [page.get_textpage().get_text_range() for page in document]
+    assert len(pages) == 2 + 6 + 1 and all("* assumed" in page for page in pages)
+    assert all(f"Pass {name}" in page for name, page in zip(jobs[:6], pages[2:8], strict=True))
     assert {path.name for path in tmp_path.glob("[!.]*")} == {"as-made", "laser", "report.json"}
     assert [path.name for path in (tmp_path / "as-made").iterdir()] == ["laser.json"]
     assert "assumed" in result.stderr
@@ -78,6 +94,38 @@ def test_the_folder_holds_what_a_shop_needs(tmp_path: Path) -> None:
     ):
         assert text in sheet
     assert "<script" not in sheet and "http" not in sheet
+
+
+@pytest.mark.parametrize(("taper_deg", "corner"), [(0, "overcut"), (3, "plain")])
+def test_masses_fill_the_burnt_cavities(taper_deg: float, corner: str) -> None:
+    """Prisms of the nominal cells without taper; else the burnt outlines at 201 depths, by the trapezoidal rule."""
+    job = made_job(laser__taper_deg=str(taper_deg), laser__corner=corner)
+    depths = np.linspace(0, job.setup.depth_mm, 201)
+    for one in job.cell_passes:
+        assert one.cavities is not None
+        areas = [
+            sum(
+                shapely.Polygon(ring).area
+                for ring in burnt_cell_outlines_mm(one, job.front.at_depth(z, taper_deg))
+            )
+            for z in depths
+        ]
+        mix = weighings(job)[one.name]
+        cast_g = np.trapezoid(areas, depths) * mix.silicone.density_g_cm3.value / 1000
+        assert mix.cast_g == pytest.approx(cast_g, rel=2e-4)
+        if not taper_deg:
+            cells = len(one.cavities.cell) * np.sqrt(3) / 4 * 1.5**2
+            assert mix.cast_g == pytest.approx(cells * job.setup.depth_mm * 1.07e-3, rel=1e-3)
+
+
+def test_a_fill_of_another_chemistry_is_warned_of(tmp_path: Path) -> None:
+    text = materials()["silicone-black"].read_text(encoding="utf-8")
+    material = tmp_path / "mine.toml"
+    material.write_text(text.replace('"ecoflex-00-30"', '"mold-max-30"'), encoding="utf-8")
+    job = made_job(laser__material=str(material))
+    sheet = process_sheet(job, tuple(pass_timing(job, one) for one in job.passes), ())
+    warned = [text for step in sheet.steps for text in step.warnings]
+    assert len(warned) == 4 and "may not cure on" in warned[0] and "tin against platinum" in warned[0]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from shapely import Polygon, STRtree, box, unary_union
 from typer.testing import CliRunner
 
 from cmpdesign import build_layout, load
@@ -19,9 +20,11 @@ from cmpdesign.errors import DesignError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.files.resolution import resolution_dpi
 from cmpdesign.products.sheet.key import SheetKey, parse_key
-from cmpdesign.products.sheet.print_sheet import make_print_sheet
+from cmpdesign.products.sheet.page import FilledPolygons, TextLine
+from cmpdesign.products.sheet.print_sheet import made_pad, make_print_page, make_print_sheet
 from cmpdesign.products.sheet.scan import SheetBars, SheetReading, find_sheet_bars, measure_sheet
 from cmpdesign.products.sheet.verdict import PERSPECTIVE_TOLERANCE_MM
+from extractor import Extractor, Status, parse_layout
 
 DPI = 200.0
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
@@ -114,6 +117,76 @@ def test_what_cannot_be_read_says_why(scan: Pixels) -> None:
     height = covered.shape[0]
     covered[: int(height - 34 / 25.4 * DPI)] = 255
     assert "a scale bar" in str(find_sheet_bars(covered))
+
+
+@pytest.mark.parametrize("size", ["a3", "a4", "a5", "130x190mm"])
+def test_no_text_lies_on_another_mark_or_beside_the_page(size: str) -> None:
+    """Widths by the metrics of the PDF's face."""
+    from reportlab.pdfbase.pdfmetrics import stringWidth
+
+    parameters = design(
+        **{"sheet.page": size, "mirrored": "true", "print_mirror": "true", "sheet.ruler": "true"}
+    )
+    page, _ = make_print_page(parameters, build_layout(parameters))
+    texts = [
+        box(
+            one.x_mm,
+            one.y_mm - 0.7 * one.size_mm,
+            one.x_mm + stringWidth(one.text, "Helvetica", one.size_mm),
+            one.y_mm,
+        )
+        for one in page.items
+        if isinstance(one, TextLine) and not one.turned
+    ]
+    drawn = [one for one in page.items if isinstance(one, FilledPolygons) and one.name != "paper"]
+    shapes = [Polygon(ring) for one in drawn for ring in one.polygons]
+    said = unary_union(texts)
+    assert len(texts) >= 8 and said.within(box(0, 0, page.width_mm, page.height_mm))
+    assert not STRtree(shapes).query(texts, predicate="intersects").size
+    assert sum(text.area for text in texts) == pytest.approx(said.area)
+
+
+@pytest.mark.parametrize(
+    ("mirrored", "film", "side"),
+    [("true", "clear", "front"), ("true", "opaque", "back"), ("false", "clear", "back")],
+)
+def test_a_film_has_its_side_its_boxes_and_a_white_layer_if_clear(
+    mirrored: str, film: str, side: str
+) -> None:
+    import pypdfium2
+
+    parameters = design(**{"mirrored": mirrored, "sheet.film": film, "sheet.bleed_mm": "1.5"})
+    layout = build_layout(parameters)
+    content = make_print_sheet(parameters, layout).files["print/film.pdf"]
+    pages = list(pypdfium2.PdfDocument(content))
+    assert len(pages) == 1 + (film == "clear")
+    for page in pages:
+        left, low, right, high = np.array(page.get_trimbox()) * 25.4 / 72
+        assert (right - left, high - low) == pytest.approx(layout.size_mm, abs=1e-4)
+        grown = np.ptp(np.array(page.get_bleedbox()).reshape(2, 2), axis=0) * 25.4 / 72
+        assert grown[1] == pytest.approx(layout.size_mm[1] + 3, abs=1e-4) and grown[0] > layout.size_mm[0] + 3
+    inks, *white = (page.render(scale=DPI / 72).to_numpy()[:, :, :3] for page in pages)
+    reader = Extractor(parse_layout(layout_to_json(layout)), side="either")
+    markers = reader.extract(np.ascontiguousarray(inks))
+    assert (markers.status == Status.MEASURED).all() and markers.mirrored == (side == "back")
+    for layer in white:
+        # White lies below all that is black on the page of inks, and below the cells within it; the last line is text.
+        covered, black = ((page[:-40] < level).all(axis=2) for page, level in ((layer, 160), (inks, 100)))
+        assert not (black & ~covered).any() and covered.mean() > 1.2 * black.mean()
+
+
+@pytest.mark.parametrize("gain_mm", [0.0, 0.05])
+def test_dot_gain_makes_the_cells_smaller(gain_mm: float) -> None:
+    """The black moves every side of an equilateral triangle inward."""
+    parameters = design(**{"sheet.dot_gain_mm": str(gain_mm)})
+    made = made_pad(parameters, build_layout(parameters))
+    share = (1 - 2 * np.sqrt(3) * gain_mm / 1.5) ** 2
+    assert made.figures()["area_percent"] == pytest.approx(100 * share, abs=1e-3)
+    closed = design(**{"sheet.dot_gain_mm": "0.45"})
+    with pytest.raises(
+        DesignError, match=r"0\.45: the ink closes cells, whose smallest inner radius is 0\.433"
+    ):
+        made_pad(closed, build_layout(closed))
 
 
 def test_keys_survive_odd_names() -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from cmpdesign.design.mold_options import Tool
 from cmpdesign.design.templates import templates_folder
@@ -14,7 +14,7 @@ from cmpdesign.inputs.documents import read_toml
 from cmpdesign.inputs.files import path_exists
 from cmpdesign.inputs.names import Line, Name, nearest_name
 from cmpdesign.inputs.validation import validation_message
-from cmpdesign.products.laser.library import Sourced
+from cmpdesign.products.materials.sourced import Sourced, StrictModel, assumed
 
 Share = Annotated[float, Field(ge=0, lt=10)]
 Positive = Annotated[float, Field(gt=0, le=1e6)]
@@ -22,12 +22,7 @@ Loss = Annotated[float, Field(ge=0, le=500)]
 Celsius = Annotated[float, Field(gt=23, le=300)]
 
 
-def _assumed(value: Any) -> Any:
-    """The default of a field that a file leaves out."""
-    return Sourced(value=value, source="assumed: the file leaves it out")
-
-
-class Silicone(BaseModel):
+class Silicone(StrictModel):
     """A casting silicone.
 
     Attributes:
@@ -46,8 +41,6 @@ class Silicone(BaseModel):
         clear: the camera can see through a base layer of this silicone; None: unknown.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     name: Name
     cure: Literal["platinum", "tin"]
     shrinkage_percent: Sourced[Share]
@@ -57,13 +50,13 @@ class Silicone(BaseModel):
     inhibited_by: Sourced[tuple[Tool, ...]]
     remedy: Line
     clear: Sourced[bool] | None = None
-    parts_a_b: Sourced[tuple[Positive, Positive]] = _assumed((1.0, 1.0))
-    pigment_percent: Sourced[Share] = _assumed(2.0)
-    retarder_percent: Sourced[Share] = _assumed(1.0)
-    thickener_percent: Sourced[Share] = _assumed(2.0)
-    loss_percent: Sourced[Loss] = _assumed(30.0)
-    degas_min: Sourced[Positive] = _assumed(3.0)
-    warm_cure: Sourced[tuple[tuple[Celsius, Positive], ...]] = _assumed(())
+    parts_a_b: Sourced[tuple[Positive, Positive]] = assumed((1.0, 1.0))
+    pigment_percent: Sourced[Share] = assumed(2.0)
+    retarder_percent: Sourced[Share] = assumed(1.0)
+    thickener_percent: Sourced[Share] = assumed(2.0)
+    loss_percent: Sourced[Loss] = assumed(30.0)
+    degas_min: Sourced[Positive] = assumed(3.0)
+    warm_cure: Sourced[tuple[tuple[Celsius, Positive], ...]] = assumed(())
 
     @property
     def scale(self) -> float:
@@ -76,8 +69,8 @@ def silicones() -> dict[str, Path]:
     return {path.stem: path for path in sorted((templates_folder() / "silicones").glob("*.toml"))}
 
 
-def load_silicone(name_or_path: str) -> Silicone:
-    """Load a silicone template by name, or a silicone from a TOML file.
+def load_silicone(name_or_path: str, user: str = "mold") -> Silicone:
+    """Load a silicone template by name, or a silicone from a TOML file; errors begin with ``user``, which names it.
 
     Raises:
         DesignError: unknown silicone, or a file that does not describe a silicone.
@@ -86,12 +79,12 @@ def load_silicone(name_or_path: str) -> Silicone:
     path = known.get(name_or_path, Path(name_or_path))
     if not path_exists(path):
         raise DesignError(
-            f"mold: {name_or_path!r} is no silicone{nearest_name(name_or_path, known)}; there are "
+            f"{user}: {name_or_path!r} is no silicone{nearest_name(name_or_path, known)}; there are "
             f"{', '.join(known)}, or give a TOML file"
         )
     try:
         return Silicone.model_validate(read_toml(path))
     except InputError as error:
-        raise DesignError(f"mold: {error}") from None
+        raise DesignError(f"{user}: {error}") from None
     except ValidationError as error:
-        raise DesignError(f"mold: {path}: {validation_message(error, Silicone)}") from None
+        raise DesignError(f"{user}: {path}: {validation_message(error, Silicone)}") from None

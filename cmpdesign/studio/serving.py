@@ -1,0 +1,86 @@
+"""The server: a socket of this machine, uvicorn, and the browser."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from collections.abc import Callable
+from threading import Timer
+from typing import Any
+
+from cmpdesign.errors import CmpDesignError, parameter
+from cmpdesign.libraries import extra, require_libraries
+from cmpdesign.studio.guard import Door
+
+HOST, PORT = "127.0.0.1", 8300
+MOST_MESSAGE_BYTES = 8 << 20  # of a websocket: one frame of a camera
+BROWSER_S = 0.3  # from the start to the browser's first request
+
+
+def serve(
+    host: str,
+    port: int,
+    announce: Callable[[str], None],
+    *,
+    with_browser: bool = True,
+    live: Any = None,
+) -> None:
+    """Serve the page until Ctrl-C.
+
+    Args:
+        host: address to listen on.
+        port: port; 0: any free port.
+        announce: called with the page's address, with its token, once requests are accepted.
+        with_browser: also open the address in the browser.
+        live: the source of the live part, if any.
+
+    Raises:
+        MissingLibraryError: the extra is not installed.
+        CmpDesignError: the port cannot be opened.
+    """
+    require_libraries("studio", "starlette", "uvicorn", "websockets")
+    from cmpdesign.studio.app import make_app
+
+    with extra("studio"):
+        import uvicorn
+    listening = _listen(host, port)
+    door = Door(host, listening.getsockname()[1], secrets.token_urlsafe(24))
+    config = uvicorn.Config(
+        make_app(door, live),
+        log_level="error",
+        access_log=False,
+        server_header=False,
+        ws_max_size=MOST_MESSAGE_BYTES,
+        timeout_graceful_shutdown=3,
+    )
+    announce(door.address)
+    if with_browser:
+        import webbrowser
+
+        timer = Timer(BROWSER_S, webbrowser.open, [door.address + ("#/live" if live is not None else "")])
+        timer.daemon = True
+        timer.start()
+    uvicorn.Server(config).run(sockets=[listening])
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """A socket that accepts requests from now on."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listening = socket.socket(family, kind, protocol)
+        try:
+            if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows
+                listening.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+            else:
+                listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind(address)
+            listening.listen()
+        except BaseException:
+            listening.close()
+            raise
+    except (OSError, OverflowError) as error:
+        raise CmpDesignError(
+            f"{parameter('port')} {port} of {host}: cannot be opened ({getattr(error, 'strerror', None) or error}); "
+            "end the program that uses it, or give another port, or 0 for any free port"
+        ) from None
+    return listening

@@ -1,0 +1,227 @@
+"""The page in a real browser: an installed Chromium, driven by Playwright, against a running ``cmpdesign studio``."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import pytest
+
+import cmpdesign
+from cmpdesign.products.drawing.svg import layout_to_svg
+from docs.figures.screens import browser, chromium, served
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium() is None, reason="no Chromium is installed: apt-get install chromium"),
+]
+TO_SCREEN = """([x, y]) => {
+    const to = new DOMPoint(x, y).matrixTransform(document.querySelector(".canvas svg").getScreenCTM());
+    return [to.x, to.y];
+}"""
+SMALL_TEXTS = """() => [...document.querySelectorAll("body *")].filter((one) =>
+    [...one.childNodes].some((node) => node.nodeType === Node.TEXT_NODE && node.textContent.trim())
+    && !one.closest("svg") && parseFloat(getComputedStyle(one).fontSize) < 12).map((one) => one.outerHTML)"""
+NAMELESS = """() => [...document.querySelectorAll("button, input, select, textarea, a")].filter((one) =>
+    one.offsetParent && !(one.textContent.trim() || one.ariaLabel || one.labels?.length))
+    .map((one) => one.outerHTML)"""
+PALE_TEXTS = """() => {
+    const parse = (text) => { const [r, g, b, a = 1] = text.match(/[\\d.]+/g).map(Number); return [r, g, b, a]; };
+    const light = ([r, g, b]) => [r, g, b].map((one) => one / 255)
+        .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
+        .reduce((sum, one, at) => sum + one * [0.2126, 0.7152, 0.0722][at], 0);
+    const ground = (one) => {
+        for (; one; one = one.parentElement) {
+            const color = parse(getComputedStyle(one).backgroundColor);
+            if (color[3] === 1) return color;
+        }
+        return [255, 255, 255, 1];
+    };
+    const ratio = (one) => {
+        const [dark, bright] = [light(parse(getComputedStyle(one).color)), light(ground(one))].sort((a, b) => a - b);
+        return (bright + 0.05) / (dark + 0.05);
+    };
+    return [...document.querySelectorAll("main *, header *")].filter((one) => one.checkVisibility() && !one.disabled
+        && [...one.childNodes].some((node) => node.nodeType === Node.TEXT_NODE && node.textContent.trim())
+        && !one.closest("svg, option") && ratio(one) < 4.5).map((one) => `${ratio(one).toFixed(2)} ${one.outerHTML}`);
+}"""
+ATTACK = """async (home) => {
+    const request = { method: "POST", mode: "no-cors", credentials: "include", body: "{}" };
+    try { return (await fetch(home + "/api/builds", request)).type; } catch { return "refused"; }
+}"""
+TOO_LARGE = "async () => (await fetch('/api/toml', { method: 'POST', body: '#'.repeat(1 << 21) })).status"
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with served() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def chrome() -> Iterator[Any]:
+    with browser() as running:
+        yield running
+
+
+@pytest.fixture
+def page(chrome: Any, address: str) -> Iterator[Any]:
+    """A new page at the start; it must end without an error in its console and without a foreign request."""
+    shown = chrome.new_page(viewport={"width": 1280, "height": 800})
+    problems: list[str] = []
+    home = address.partition("/?")[0]
+    shown.on("pageerror", lambda error: problems.append(str(error)))
+    shown.on("console", lambda line: problems.append(line.text) if is_problem(line) else None)
+    shown.on("request", lambda one: None if one.url.startswith((home, "blob:")) else problems.append(one.url))
+    shown.goto(address)
+    shown.wait_for_selector(".card")
+    yield shown
+    shown.close()
+    assert problems == []
+
+
+def is_problem(line: Any) -> bool:
+    """True for an error that is not the browser's own line on a refused request."""
+    return line.type == "error" and "422" not in line.text
+
+
+def open_template(page: Any, name: str) -> None:
+    page.click(f".card:has(b:text-is('{name}'))")
+    page.wait_for_selector(".stage svg path.white", state="attached")
+
+
+def wait_for_markers(page: Any, count: int) -> None:
+    page.wait_for_selector(f".note:text-matches('^{count} markers')")
+
+
+def drawn(page: Any) -> dict[str, str]:
+    """Color -> path of the drawing."""
+    script = "all => Object.fromEntries(all.map(one => [one.getAttribute('class'), one.getAttribute('d')]))"
+    return dict(page.eval_on_selector_all(".stage svg > path", script))
+
+
+def written(design: cmpdesign.Design) -> dict[str, str]:
+    groups = re.findall(r'<g fill="[^"]+" id="(\w+)">(.*?)</g>', layout_to_svg(design.layout))
+    return {name: "".join(re.findall(r' d="([^"]+)"', group)) for name, group in groups}
+
+
+def test_a_changed_parameter_draws_what_the_command_line_writes(page: Any) -> None:
+    open_template(page, "tac3d")
+    assert drawn(page) == written(cmpdesign.load("tac3d"))
+    page.locator("input[aria-label='layers, slider']").fill("7")
+    wait_for_markers(page, 169)
+    assert drawn(page) == written(cmpdesign.load("tac3d", layers=7))
+    page.click("#undo")
+    wait_for_markers(page, 331)
+    page.keyboard.press("Control+Shift+Z")
+    wait_for_markers(page, 169)
+    page.reload()  # the design is in the address
+    wait_for_markers(page, 169)
+    assert drawn(page) == written(cmpdesign.load("tac3d", layers=7))
+
+
+def test_a_finding_stands_at_its_field_and_the_button_removes_it(page: Any) -> None:
+    open_template(page, "honeycomb")
+    page.fill("#f-pitch_mm", "0.3")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".field.warning:has(#f-pitch_mm)")
+    page.click(".finding.warning:has-text('smallest cell') >> text=Apply the remedy")
+    page.wait_for_selector(".finding.good")
+    assert 0.51 < float(page.input_value("#f-pitch_mm")) < 0.56
+    page.fill("#f-width_mm", "30")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".finding.error:has-text('fix the size twice')")
+
+
+def test_a_build_is_byte_equal_to_the_command_line(page: Any, tmp_path: Path) -> None:
+    open_template(page, "honeycomb")
+    page.click("nav >> text=Make")
+    page.check("input[name=laser]")
+    page.click("button:text-is('Build')")
+    page.wait_for_selector("text=Download all", timeout=120_000)
+    with page.expect_download() as download:
+        page.click("text=Download all")
+    archive = zipfile.ZipFile(download.value.path())
+    (tmp_path / "design.toml").write_bytes(archive.read("design.toml"))
+    words = ["build", "design.toml", "-o", "made", "--only", "svg,layout,preview,report,laser"]
+    command = [sys.executable, "-m", "cmpdesign", *words]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True, check=False).returncode == 0
+    files = [path for path in (tmp_path / "made").rglob("[!.]*") if path.is_file()]
+    made = {path.relative_to(tmp_path / "made").as_posix(): path.read_bytes() for path in files}
+    assert set(archive.namelist()) == {"design.toml", *made} and len(made) > 30
+    assert {name: archive.read(name) for name in made} == made
+
+
+def test_a_build_is_canceled_and_its_files_are_gone(page: Any) -> None:
+    open_template(page, "tac3d")
+    page.click("nav >> text=Make")
+    page.check("input[name=mold]")
+    page.click("button:text-is('Build')")
+    page.wait_for_selector(".job .log:has-text('begins')", timeout=60_000)
+    page.click("text=Cancel")
+    page.wait_for_selector(".job b:text-is('Canceled')")
+    page.wait_for_timeout(1000)
+    assert page.locator("text=Download all").count() == 0
+
+
+def test_good_and_bad_pictures(page: Any, tmp_path: Path) -> None:
+    layout = cmpdesign.load("tac3d").layout
+    rendered = cmpdesign.render(layout, pitch_px=22, rotation_deg=11, noise=2, seed=3)
+    cv2.imwrite(str(tmp_path / "seen.png"), rendered.image)
+    (tmp_path / "words.png").write_text("no picture")
+    other = cmpdesign.render(cmpdesign.load("honeycomb", layers=4).layout, noise=2).image
+    cv2.imwrite(str(tmp_path / "other.png"), other)
+    open_template(page, "tac3d")
+    page.click("nav >> text=Read")
+    page.set_input_files("#picture", tmp_path / "seen.png")
+    page.wait_for_selector(".finding.good:has-text('331 of 331')")
+    page.mouse.click(*page.evaluate(TO_SCREEN, rendered.truth.marker_xy_px[217].tolist()))
+    page.wait_for_selector("h2:text-is('Marker 217')")
+    page.set_input_files("#picture", tmp_path / "words.png")
+    page.wait_for_selector(".finding.error:has-text('words.png: is not an image')")
+    page.set_input_files("#picture", tmp_path / "other.png")
+    page.wait_for_selector(".finding.error:has-text('Not verified')")
+    assert page.locator(".stages button").count() > 3
+
+
+@pytest.mark.parametrize(("width", "theme"), [(360, "dark"), (1280, "light"), (3840, "dark")])
+def test_sizes_contrast_and_names(chrome: Any, address: str, width: int, theme: str) -> None:
+    """No part is wider than the window, no text is below 12 px or paler than 4.5 : 1, every control has a name."""
+    page = chrome.new_page(viewport={"width": width, "height": 900}, color_scheme=theme)
+    page.goto(address)
+    open_template(page, "tac3d")
+    assert page.evaluate("document.documentElement.dataset.theme") == theme
+    page.fill("#f-pitch_mm", "0.5")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".finding.warning")
+    for part in page.locator("nav a").all_inner_texts():
+        page.click(f"nav >> text={part}")
+        page.wait_for_timeout(300)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, part
+        for script in (SMALL_TEXTS, NAMELESS, PALE_TEXTS):
+            assert page.evaluate(script) == [], (part, script)
+    page.close()
+
+
+def test_a_foreign_page_gets_nothing(chrome: Any, address: str) -> None:
+    """A page of another origin of this machine, in a browser that knows the token's cookie."""
+    context = chrome.new_context()
+    own, home = context.new_page(), address.partition("/?")[0]
+    own.goto(address)
+    own.wait_for_selector(".card")
+    with served() as other:
+        stranger = context.new_page()
+        stranger.goto(other)
+        stranger.wait_for_selector(".card")
+        assert stranger.evaluate(ATTACK, home) == "refused"
+    answer = context.request.post(f"{home}/api/builds", headers={"Origin": "http://127.0.0.1:1"}, data="{}")
+    assert answer.status == 403 and "other pages" in json.loads(answer.text())["error"]
+    assert own.evaluate(TOO_LARGE) == 413
+    context.close()
