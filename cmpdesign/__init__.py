@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cmpdesign.api.calibration import calibrate_camera as calibrate_camera
+    from cmpdesign.api.calibration import calibrate_rig as calibrate_rig
     from cmpdesign.api.datasets import dataset as dataset
     from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
@@ -92,6 +93,7 @@ _HOMES = {
     "calibrate_force": "cmpdesign.api.force",
     "calibrate_gel": "cmpdesign.api.force",
     "calibrate_pattern": "cmpdesign.api.workshop",
+    "calibrate_rig": "cmpdesign.api.calibration",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",
     "export_lerobot": "cmpdesign.api.workshop",

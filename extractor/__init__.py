@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from extractor.space.field import Field
     from extractor.space.medium import Medium, WindowPlane
     from extractor.space.reconstruction import Reconstructor, Shape
-    from extractor.space.rig import Rig, load_rig, parse_rig
+    from extractor.space.rig import Deviation, Rig, load_rig, parse_rig
     from extractor.space.triangulation import PointReason, triangulate
     from extractor.space.views import ShapeFrame, ShapeTracker, ViewExtractor
     from extractor.track.displacement import Rest
@@ -48,6 +48,7 @@ __all__ = [
     "ContactForce",
     "ContactReader",
     "ContactReason",
+    "Deviation",
     "Extractor",
     "ExtractorError",
     "Field",
@@ -97,6 +98,7 @@ _HOMES = {
     "ContactForce": "extractor.contact",
     "ContactReader": "extractor.contact",
     "ContactReason": "extractor.contact",
+    "Deviation": "extractor.space.rig",
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",
     "ForceModel": "extractor.contact",

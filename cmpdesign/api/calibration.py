@@ -1,17 +1,17 @@
-"""Calibrations of one sensor's cameras: ``calibrate camera`` of the command line."""
+"""Calibrations of one sensor: ``calibrate camera`` and ``calibrate rig`` of the command line."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from cmpdesign.api.layouts import reference_from
 from cmpdesign.api.workshop import read_pictures
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.watch import tell
 
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cmpdesign.calibration.camera import CameraCalibration
+    from cmpdesign.calibration.rig.calibration import RigCalibration
     from cmpdesign.layout.layout import Layout as AnyLayout
-    from extractor import LayoutLike
+    from cmpdesign.sensor.sensor_file import SensorFile
+    from extractor import LayoutLike, Markers, Reference, Side
     from extractor.presets import Preset
 
 Response = Literal["srgb", "linear"] | float
@@ -100,6 +102,113 @@ def calibrate_camera(
         used, calibration = likely_response(calibration, read)
     result = CalibratedCamera(calibration, used, found.unread)
     return result if output is None else _written(result, Path(output), names)
+
+
+def calibrate_rig(
+    layout: LayoutLike | AnyLayout,
+    rig: str | Path,
+    rest: str | Path | Sequence[str | Path],
+    output: str | Path | None = None,
+    *,
+    steps: Mapping[float, str | Path] | None = None,
+    step_sigma_mm: float = 0.002,
+    side: Side = "designed",
+    max_pixels: int = MOST_PIXELS,
+) -> RigCalibration:
+    """Calibrate a sensor's views, window and gel from its pad at rest, as the command ``calibrate rig`` does.
+
+    >>> found = cmpdesign.calibrate_rig("layout.json", "measured.toml", ["rest.png"], "sensor.toml")
+    >>> found.held, found.depth_share
+
+    Args:
+        layout: the pad's layout: a layout, the path of a layout file, a ``Reference``, or its JSON object.
+        rig: rig or sensor file: lenses, the measured [medium] and its [medium_deviation], and where it is known the
+            camera's [calibration.camera]. Poses in the file are not used.
+        rest: pictures of the pad at rest; of several cameras one for each view, joined by commas.
+        output: sensor file to write, beside ``rig``; None: none.
+        steps: ways of a flat plate that presses the pattern, mm -> picture.
+        step_sigma_mm: standard deviation of a way.
+        side: see ``extractor.Extractor``.
+        max_pixels: largest image that is read, width x height.
+
+    Raises:
+        CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures from which no rig follows.
+        OutputError: the file cannot be written.
+    """
+    import numpy as np
+
+    from cmpdesign.calibration.rig.calibration import calibrate_rig_markers
+    from cmpdesign.sensor.sensor_file import load_sensor_file
+
+    sensor, reference = load_sensor_file(rig), reference_from(layout)
+    if output is not None:
+        _require_beside(Path(rig), Path(output))
+    given = [rest] if isinstance(rest, str | Path) else list(rest)
+    ways = dict(steps or {})
+    names = [*map(str, given), *map(str, ways.values())]
+    found = _read_views(sensor, reference, names, side, max_pixels)
+    camera = sensor.table.calibration.camera
+    calibration = calibrate_rig_markers(
+        reference,
+        sensor.rig,
+        found[: len(given)],
+        dict(zip(ways, found[len(given) :], strict=True)),
+        camera_cov=np.array(camera.covariance) if camera is not None and camera.covariance else None,
+        step_sigma_mm=step_sigma_mm,
+    )
+    if output is not None:
+        from cmpdesign.calibration.outputs.sensor_text import calibrated_text
+        from cmpdesign.files.atomic import write_file
+
+        dated = [name for whole in names[: len(given)] for name in whole.split(",")]
+        text = calibrated_text(sensor, calibration, len(given), tuple(ways), _date_of(dated))
+        write_file(Path(output), text)
+    return calibration
+
+
+def _require_beside(rig: Path, output: Path) -> None:
+    if output.suffix.lower() != ".toml":
+        raise CmpDesignError(f"{output}: unknown ending of a sensor file; expected .toml")
+    if output.resolve() == rig.resolve():
+        raise CmpDesignError(
+            f"{output} is RIG itself, whose measured values a further calibration needs; choose another name"
+        )
+    if output.resolve().parent != rig.resolve().parent:
+        raise CmpDesignError(
+            f"{output}: write the file beside {rig}, since files are named relative to its folder"
+        )
+
+
+def _read_views(
+    sensor: SensorFile, reference: Reference, names: Sequence[str], side: Side, max_pixels: int
+) -> list[tuple[Markers, ...]]:
+    """The markers of all pictures, view by view.
+
+    Raises:
+        CmpDesignError: a picture in which a view shows no pattern.
+    """
+    from cmpdesign.files.images import read_image
+    from extractor import ViewExtractor
+    from extractor.result import SIDE_REASONS
+
+    views = ViewExtractor(
+        reference, sensor.rig.without_poses(), "accurate", cast("Any", sensor.table.response), side
+    )
+    out = []
+    for number, name in enumerate(names):
+        pictures = [read_image(Path(part), max_pixels) for part in name.split(",")]
+        markers = views.extract(pictures if len(pictures) > 1 else pictures[0])
+        for view, one in zip(sensor.rig.views, markers, strict=True):
+            if not one.found:
+                hint = (
+                    f"; check which views are mirrored, or state {parameter('side')}"
+                    if one.reason in SIDE_REASONS
+                    else ""
+                )
+                raise CmpDesignError(f"{name}: view {view.name!r} shows no pattern: {one.reason}{hint}")
+        out.append(markers)
+        tell(number + 1, len(names), unit="pictures")
+    return out
 
 
 def _written(result: CalibratedCamera, output: Path, names: Sequence[str]) -> CalibratedCamera:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -257,11 +256,10 @@ def _moved(problem: Problem, guess: Guess, common: Array, poses: Array) -> Guess
     if not np.isfinite(changed).all() or changed[:2].min() <= 0.05 * values[:2].min():
         return None
     camera = problem.model.view(changed)
-    views = []
-    for view, step in zip(guess.views, poses, strict=True):
-        turn = np.asarray(cv2.Rodrigues(step[:3])[0]) @ view.R_camera_from_layout
-        left, _, right = np.linalg.svd(turn)
-        views.append(camera.at(left @ right, view.t_camera_from_layout_mm + step[3:]))
+    views = [
+        camera.at(view.R_camera_from_layout, view.t_camera_from_layout_mm).turned(step)
+        for view, step in zip(guess.views, poses, strict=True)
+    ]
     return Guess(tuple(views), guess.shape + common[len(values) :])
 
 

@@ -41,3 +41,38 @@ class CalibrateCameraDocument(Document):
     further_view: str = Field(description="The view to add that would help most.")
     further_view_ray_px: float
     pictures: tuple[CalibrationPicturePart, ...]
+
+
+class MirrorsPart(Part):
+    """The mirrors of two views that share a camera."""
+
+    views: tuple[str, str]
+    normals: tuple[tuple[float, ...], tuple[float, ...]] = Field(
+        description="In the camera's frame, for a camera that faces the pattern."
+    )
+    distances_mm: tuple[float, float] = Field(description="From the camera to each mirror's plane.")
+    angle_deg: float = Field(description="Between the mirrors.")
+    shift_mm: float = Field(
+        description="Between the views along the line in which the mirrors meet; 0 is right."
+    )
+
+
+class CalibrateRigDocument(Document):
+    """The result of ``calibrate rig``."""
+
+    format: Literal["cmp-calibration-rig"] = "cmp-calibration-rig"
+    version: Literal[1] = 1
+    written: str
+    pictures: int = Field(description="At rest.")
+    steps_mm: tuple[float, ...]
+    plate_markers: tuple[int, ...] = Field(description="Markers on the plate in each step.")
+    parameters: dict[str, float] = Field(description="Of lenses and medium.")
+    stated: dict[str, float] = Field(description="Their standard deviations before the pictures.")
+    deviations: dict[str, float] = Field(
+        description="Their standard deviations after, and those of the poses."
+    )
+    held: tuple[str, ...] = Field(description="Parameters that the pictures do not determine.")
+    rms_px: dict[str, float] = Field(description="RMS residual per axis at rest, of each view.")
+    scale: float = Field(description="Residuals over their stated deviations; 1 is right.")
+    depth_share: float = Field(description="Standard deviation of the depth of a press, over the press.")
+    mirrors: tuple[MirrorsPart, ...]

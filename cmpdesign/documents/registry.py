@@ -33,6 +33,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "calibrate force": (reading.CalibrateForceDocument,),
     "calibrate gel": (reading.CalibrateGelDocument,),
     "calibrate pattern": (reading.CalibratePatternDocument,),
+    "calibrate rig": (calibration.CalibrateRigDocument,),
     "export lerobot": (runs.ExportDocument,),
     "export zarr": (runs.ExportDocument,),
     **{f"evaluate {name}": (runs.EvaluateDocument,) for name in EXPERIMENTS},

@@ -148,8 +148,8 @@ class ReconstructDocument(Document):
     sigma_um: tuple[float, ...] | None = Field(description="Median standard deviations in x, y and z.")
     systematic_um: tuple[float, ...] | None = Field(
         None,
-        description="Standard deviations of the largest displacement in x, y and z by [medium_deviation]; "
-        "the same error in all frames.",
+        description="Standard deviations of the largest displacement in x, y and z by [[deviation]] or "
+        "[medium_deviation] of the rig; the same error in all frames.",
     )
     time_ms: dict[str, float]
     views: tuple[ViewPart, ...]

@@ -110,7 +110,7 @@ class ShapeStatistics:
             self._largest = _LargestDisplacement(
                 float(np.nanmax(length)), frame.index, int(np.nanargmax(length))
             )
-            if self._reconstructor.rig.medium_deviation:
+            if self._reconstructor.rig.independent_deviations:
                 self._systematic_um = (1e3 * shape.displacement_systematic_mm[self._largest.marker]).tolist()
 
     def to_json(self, source: str, declared: int | None, ended: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -187,6 +188,12 @@ class View:
     def at(self, rotation: Array, shift: Array) -> View:
         """The same view with this pose."""
         return replace(self, mirrored=None, R_camera_from_layout=rotation, t_camera_from_layout_mm=shift)
+
+    def turned(self, step: Any) -> View:
+        """The placed view after a turn (rad) and a shift (mm) of the pattern, ``step`` (6,), see ``Linearisation``."""
+        turn, _ = cv2.Rodrigues(np.array(step[:3], np.float64))
+        left, _, right = np.linalg.svd(np.asarray(turn) @ self.R_camera_from_layout)
+        return self.at(left @ right, self.t_camera_from_layout_mm + np.array(step[3:], np.float64))
 
     def project(self, xyz_mm: Array) -> Array:
         """(N, 2) px of points (N, 3) mm in the layout frame; NaN behind the camera and beyond the fold radius."""

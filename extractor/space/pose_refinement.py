@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -88,7 +87,10 @@ def refine_poses(views: Sequence[View], rest: RestMarkers, free: NDArray[np.bool
         scale = np.diag(normal.diagonal())
         step = np.zeros(len(chosen))
         step[chosen] = _solve_normal_equations(normal + damping * scale, gradient)
-        tried = [_perturbed_view(view, step[6 * i : 6 * i + 6]) for i, view in enumerate(current)]
+        tried = [
+            view.turned(part) if part.any() else view
+            for view, part in zip(current, step.reshape(-1, 6), strict=True)
+        ]
         tried_system = _linearise_residuals(tried, rest)
         if _chi_square(tried_system.residual_px, system.weight) <= system.chi2:
             current, system, damping = tried, tried_system, damping / 10
@@ -157,12 +159,3 @@ def _linearise_residuals(views: Sequence[View], rest: RestMarkers) -> LinearSyst
     weight = np.linalg.inv(total / scale + RIDGE * np.eye(2 * count)) / scale
     shape = (markers, 2 * count, 6 * count)
     return LinearSystem(residual_px.reshape(markers, -1), by_pose.reshape(shape), np.asarray(weight))
-
-
-def _perturbed_view(view: View, step: Array) -> View:
-    """The view after a small turn (rad) and shift (mm) in ``step`` (6,); its R is orthonormal."""
-    if not step.any():
-        return view
-    turn, _ = cv2.Rodrigues(step[:3])
-    left, _, right = np.linalg.svd(np.asarray(turn) @ view.R_camera_from_layout)
-    return view.at(left @ right, view.t_camera_from_layout_mm + step[3:])

@@ -6,7 +6,7 @@ the markers at rest; each frame is then reconstructed independently, so there is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,14 @@ from extractor.space.camera import Array, View, is_finite
 from extractor.space.field import Field, hermite_along_edge
 from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
-from extractor.space.triangulation import GATE_SIGMAS, INFLATION_SIGMAS, PointReason, Points, triangulate
+from extractor.space.triangulation import (
+    GATE_SIGMAS,
+    INFLATION_SIGMAS,
+    PointReason,
+    Points,
+    deviating_moves,
+    triangulate,
+)
 
 MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position above which it is not reported, in edges; chosen
 NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers above which covariances are inflated; chosen
@@ -46,7 +53,7 @@ class Shape:
         virtual_cov_mm2: (E, m, 3, 3) float64.
         virtual_status: (E, m) uint8, a ``VirtualStatus`` each.
         displacement_systematic_mm: (M, 3) float64, standard deviations of the displacements that follow from the rig's
-            ``medium_deviation``, the same error in all frames; not in the covariances. 0 where the medium is exact.
+            deviations, the same error in all frames; not in the covariances. 0 where the rig is exact.
         problem: the views without a pattern, and why; empty where all views show the pattern.
     """
 
@@ -133,7 +140,8 @@ class Reconstructor:
         spread_mm = (float(spread[0]), float(spread[1]), float(spread[2]))
         self.poses = self._estimate_poses(rig.views, rest, spread_mm)
         self._deviating = [
-            self._estimate_poses(views, rest, spread_mm).views for views in _deviating_views(rig)
+            self._estimate_poses(one.applied(rig.views), rest, spread_mm).views
+            for one in rig.independent_deviations
         ]
         self.warnings = (self.poses.warning,) if self.poses.warning else ()
         self.model_px = 0.0 if model_px is None else model_px
@@ -195,15 +203,18 @@ class Reconstructor:
         return np.concatenate([self.rest_xyz_mm, self._rest_virtual_mm.reshape(-1, 3)])
 
     def _systematic_mm(self, markers: Sequence[Markers | None], xyz_mm: Array) -> Array:
-        """(M, 3) the deviations of the displacements by all deviating media together."""
+        """(M, 3) the standard deviations of the displacements by all deviations of the rig together."""
         moved = self._moves(markers, xyz_mm) - self._rest_moves_mm
         return np.asarray(np.where(np.isfinite(xyz_mm), np.sqrt((moved**2).sum(axis=0)), np.nan))
 
     def _moves(self, markers: Sequence[Markers | None], xyz_mm: Array) -> Array:
-        """(K, M, 3) mm by which positions (M, 3) move with each deviating medium."""
-        if not self._deviating:
-            return np.zeros((0, *xyz_mm.shape))
-        return np.stack([self._points(markers, views=views).xyz_mm - xyz_mm for views in self._deviating])
+        """(K, M, 3) mm by which positions (M, 3) move with each deviation of the rig."""
+        model_cov, unseen = np.eye(2) * self.model_px**2, np.full((len(xyz_mm), 2, 2), np.nan)
+        cov = [
+            unseen if m is None else np.where(_has_position(m)[:, None, None], m.cov_px2 + model_cov, np.nan)
+            for m in markers
+        ]
+        return deviating_moves(self.poses.views, self._deviating, xyz_mm, np.stack(cov))
 
     def _estimate_poses(
         self, views: Sequence[View], rest: Sequence[Markers] | None, spread_mm: tuple[float, float, float]
@@ -276,27 +287,19 @@ class Reconstructor:
                 problems.append(f"{view.name}: {problem}")
         return kept, "; ".join(problems)
 
-    def _points(
-        self,
-        markers: Sequence[Markers | None],
-        model_px: float | None = None,
-        views: Sequence[View] | None = None,
-    ) -> Points:
-        """The triangulated markers; with ``model_px``, this is the camera model's error and no misfit is rejected.
-
-        With other ``views`` than the poses', no point is rejected.
-        """
+    def _points(self, markers: Sequence[Markers | None], model_px: float | None = None) -> Points:
+        """The triangulated markers; with ``model_px``, this is the camera model's error and no misfit is rejected."""
         count = len(self.layout.xy_mm)
         model_cov = np.eye(2) * (self.model_px if model_px is None else model_px) ** 2
         xy = [np.full((count, 2), np.nan) if m is None else m.xy_px for m in markers]
         cov = [np.full((count, 2, 2), np.nan) if m is None else m.cov_px2 + model_cov for m in markers]
         return triangulate(
-            self.poses.views if views is None else views,
+            self.poses.views,
             np.stack(xy),
             np.stack(cov),
             cov_pose=self.poses.cov,
-            max_sigma_mm=self._max_sigma_mm if views is None else np.inf,
-            gate_sigmas=self._gate_sigmas if model_px is None and views is None else np.inf,
+            max_sigma_mm=self._max_sigma_mm,
+            gate_sigmas=self._gate_sigmas if model_px is None else np.inf,
         )
 
     def _inflated_covariances(self, points: Points) -> Points:
@@ -359,17 +362,6 @@ class Reconstructor:
         mixed = (1 - t) * normals[start, None] + t * normals[end, None]
         unit = mixed / np.linalg.norm(mixed, axis=2, keepdims=True)
         return np.asarray(np.where(known[..., None], unit, np.nan))
-
-
-def _deviating_views(rig: Rig) -> Iterator[tuple[View, ...]]:
-    """The views with each uncertain number of the medium larger by its standard deviation."""
-    for name, deviation in rig.medium_deviation.items():
-        changed = []
-        for view in rig.views:
-            assert view.medium is not None
-            medium = replace(view.medium, **{name: getattr(view.medium, name) + deviation})
-            changed.append(replace(view, medium=medium))
-        yield tuple(changed)
 
 
 def _has_position(markers: Markers) -> NDArray[np.bool_]:

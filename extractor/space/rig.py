@@ -21,13 +21,19 @@ window_index = 1.49
 
 [medium_deviation]                         # standard deviations of these numbers; left out: exact
 gel_mm = 0.05
+
+[[deviation]]                              # instead: as a calibration found them, independent of each other
+name = "gel_index"                         # what it is, mostly
+medium = [0.0, 0.004, 0.0, 0.0]            # gel_mm, gel_index, window_mm, window_index
+lens = [[0.02, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]   # of each view: focal_px, centre_px, distortion
+pose = [[0.0, 0.0, 0.0, 0.0, 0.0, 0.01]]   # of each view: turn (rad) and shift (mm) along the camera's axes
 """
 
 from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, NoReturn
@@ -57,15 +63,69 @@ KNOWN_FIELDS = (
     "window_distance_mm",
 )
 MEDIUM_FIELDS = ("gel_mm", "gel_index", "window_mm", "window_index")
+DEVIATION_FIELDS = ("name", "medium", "lens", "pose")
+READ_TABLES = ("view", "medium", "medium_deviation", "deviation")
 # Other tables in the files of scenes and of sensors; they have no properties of the views.
 OTHER_TABLES = (
     "size_px", "seed", "camera", "surface", "contact", "light", "background", "optics", "sensor", "damage", "inks",
     "sequence", "name", "description", "source", "patterns", "elastomer", "response", "load", "conditions",
-    "layout", "calibration",
+    "layout", "calibration", "format", "version", "limits",
 )  # fmt: skip
 MAX_BYTES = 1 << 24  # of a rig file
 MAX_VIEWS = 64
+MAX_DEVIATIONS = 100
 MAX_NUMBER = 1e9  # of a rig's numbers, px or mm
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """One standard deviation of a rig of V views from its numbers, independent of the rig's other ones.
+
+    Attributes:
+        name: what it is, mostly.
+        medium: offsets of the medium's ``gel_mm``, ``gel_index``, ``window_mm``, ``window_index``.
+        lens: V times the offsets of fx, fy, cx, cy (px) and of the coefficients; empty: none.
+        pose: V times a turn (rad) and a shift (mm) along the camera's axes, see ``Linearisation``; empty: none.
+    """
+
+    name: str
+    medium: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    lens: tuple[tuple[float, ...], ...] = ()
+    pose: tuple[tuple[float, ...], ...] = ()
+
+    def applied(self, views: Sequence[View]) -> tuple[View, ...]:
+        """The views with this deviation; a pose changes where the view has one."""
+        return tuple(self._applied(view, number) for number, view in enumerate(views))
+
+    def _applied(self, view: View, number: int) -> View:
+        if any(self.medium):
+            view = replace(view, medium=deviated_medium(view.medium, self.medium))
+        if self.lens:
+            view = deviated_lens(view, self.lens[number])
+        return view.turned(self.pose[number]) if self.pose and view.placed else view
+
+
+def deviated_medium(medium: Medium | None, offsets: Sequence[float]) -> Medium | None:
+    """The medium with its numbers changed by offsets (4,); a layer that is absent stays absent."""
+    if medium is None:
+        return None
+    changed = {
+        name: getattr(medium, name) + offset
+        for name, offset in zip(MEDIUM_FIELDS, map(float, offsets), strict=True)
+        if offset and getattr(medium, name)
+    }
+    return replace(medium, **changed)
+
+
+def deviated_lens(view: View, offsets: Sequence[float]) -> View:
+    """The view with fx, fy, cx, cy and its coefficients changed by offsets (4 + K,)."""
+    values = [
+        a + float(b)
+        for a, b in zip((*view.focal_px, *view.centre_px, *view.distortion), offsets, strict=True)
+    ]
+    return replace(
+        view, focal_px=(values[0], values[1]), centre_px=(values[2], values[3]), distortion=tuple(values[4:])
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +135,7 @@ class Rig:
     Attributes:
         views: the views.
         medium_deviation: standard deviations of the medium's numbers, by the fields of ``Medium``; absent: exact.
+        deviations: what a calibration says instead, with lenses and poses.
 
     Raises:
         RigError: no view, two of one name, or a deviation of a number that the medium does not have.
@@ -82,6 +143,7 @@ class Rig:
 
     views: tuple[View, ...]
     medium_deviation: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    deviations: tuple[Deviation, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "views", tuple(self.views))
@@ -100,6 +162,18 @@ class Rig:
             if any(view.medium is None or not getattr(view.medium, name) for view in self.views):
                 raise RigError(f"medium_deviation.{name} is given, but [medium] has no {name}; give it there")
         object.__setattr__(self, "medium_deviation", deviations)
+        for index, one in enumerate(self.deviations):
+            _check_deviation(one, self.views, f"deviation[{index}].")
+
+    @property
+    def independent_deviations(self) -> tuple[Deviation, ...]:
+        """``deviations``, or else those of the medium's numbers, each alone."""
+        if self.deviations:
+            return self.deviations
+        return tuple(
+            Deviation(name, tuple(value if field == name else 0.0 for field in MEDIUM_FIELDS))
+            for name, value in self.medium_deviation.items()
+        )
 
     def without_poses(self) -> Rig:
         """The same views without poses, which follow from a rest frame; ``mirrored`` is kept."""
@@ -110,6 +184,19 @@ class Rig:
     def names(self) -> tuple[str, ...]:
         """The names of the views."""
         return tuple(view.name for view in self.views)
+
+
+def _check_deviation(one: Deviation, views: Sequence[View], prefix: str) -> None:
+    counts = {
+        "lens": [4 + len(view.distortion) for view in views],
+        "pose": [6 for _ in views],
+    }
+    if len(one.medium) != len(MEDIUM_FIELDS):
+        _raise_rig_error(prefix + "medium", f"{len(one.medium)} numbers", ", ".join(MEDIUM_FIELDS))
+    for name, wanted in counts.items():
+        found = [len(row) for row in getattr(one, name)]
+        if found and found != wanted:
+            _raise_rig_error(prefix + name, f"{found} numbers", f"a list for each view, of {wanted} numbers")
 
 
 def load_rig(path: str | PathLike[str]) -> Rig:
@@ -143,8 +230,8 @@ def parse_rig(text: str, name: str = "rig") -> Rig:
 
 def _parse_document(document: Mapping[str, Any]) -> Rig:
     for field in document:
-        if field not in ("view", "medium", "medium_deviation", *OTHER_TABLES):
-            near = nearest_name(field, ("view", "medium", "medium_deviation", *OTHER_TABLES))
+        if field not in (*READ_TABLES, *OTHER_TABLES):
+            near = nearest_name(field, (*READ_TABLES, *OTHER_TABLES))
             _raise_rig_error(shown(field), f"unknown{near}", "[[view]] tables")
     tables = document.get("view")
     if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
@@ -153,7 +240,36 @@ def _parse_document(document: Mapping[str, Any]) -> Rig:
         _raise_rig_error("view", f"a list of {len(tables)}", f"at most {MAX_VIEWS} [[view]] tables")
     medium = Medium(**_parse_medium_numbers(document["medium"], "medium")) if "medium" in document else None
     deviations = _parse_medium_numbers(document.get("medium_deviation", {}), "medium_deviation")
-    return Rig(tuple(_parse_view(table, index, medium) for index, table in enumerate(tables)), deviations)
+    views = tuple(_parse_view(table, index, medium) for index, table in enumerate(tables))
+    return Rig(views, deviations, _parse_deviations(document.get("deviation", [])))
+
+
+def _parse_deviations(tables: object) -> tuple[Deviation, ...]:
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        _raise_rig_error("deviation", shown(tables), "[[deviation]] tables")
+    if len(tables) > MAX_DEVIATIONS:
+        _raise_rig_error("deviation", f"a list of {len(tables)}", f"at most {MAX_DEVIATIONS} tables")
+    found = []
+    for index, table in enumerate(tables):
+        prefix = f"deviation[{index}]."
+        _require_known_fields(table, prefix, DEVIATION_FIELDS)
+        medium = _parse_row(table.get("medium", [0.0] * len(MEDIUM_FIELDS)), prefix + "medium")
+        name = table.get("name", "")
+        if not isinstance(name, str) or not name.isprintable():
+            _raise_rig_error(prefix + "name", shown(name), "a printable text")
+        rows = {field: _parse_rows(table.get(field, []), prefix + field) for field in ("lens", "pose")}
+        found.append(Deviation(name, medium, **rows))
+    return tuple(found)
+
+
+def _parse_rows(value: object, field: str) -> tuple[tuple[float, ...], ...]:
+    if not isinstance(value, list):
+        _raise_rig_error(field, shown(value), "a list of numbers for each view")
+    return tuple(_parse_row(row, f"{field}[{index}]") for index, row in enumerate(value))
+
+
+def _parse_row(value: object, field: str) -> tuple[float, ...]:
+    return _parse_numbers(value, field, len(value) if isinstance(value, list) else 0, False)
 
 
 def _parse_medium_numbers(table: object, name: str) -> dict[str, float]:

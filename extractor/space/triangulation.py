@@ -131,6 +131,36 @@ def triangulate(
     return points
 
 
+def deviating_moves(
+    views: Sequence[View], deviating: Sequence[Sequence[View]], xyz_mm: Array, cov_px2: Array
+) -> Array:
+    """(K, N, 3) mm by which points move where their pixels stay and the views are K others; linear in the difference.
+
+    Args:
+        views: V views with poses.
+        deviating: K times V views with poses.
+        xyz_mm: (N, 3) the points by ``views``; NaN stays NaN.
+        cov_px2: (V, N, 2, 2) of their pixels; NaN where a view does not show a point.
+    """
+    seen = is_covariance(cov_px2)
+    weight = np.where(
+        seen[..., None, None], np.linalg.inv(np.where(seen[..., None, None], cov_px2, np.eye(2))), 0.0
+    )
+    linearised = [view.linearised(xyz_mm) for view in views]
+    by_point = np.nan_to_num(np.stack([one.by_point for one in linearised]))
+    design = np.swapaxes(by_point, 2, 3) @ weight
+    inverse = np.nan_to_num(_scaled_inverse((design @ by_point).sum(axis=0)), posinf=0.0)
+    out = np.zeros((len(deviating), *xyz_mm.shape))
+    for k, others in enumerate(deviating):
+        shown = np.stack(
+            [other.project(xyz_mm) - one.xy_px for other, one in zip(others, linearised, strict=True)]
+        )
+        pulled = (design @ np.nan_to_num(shown)[..., None]).sum(axis=0)
+        out[k] = -(inverse @ pulled)[..., 0]
+    out[:, ~is_finite(xyz_mm)] = np.nan
+    return out
+
+
 def _unknown_points(count: int, views: int, reason: NDArray[np.uint8]) -> Points:
     unknown = np.full((count, 3, 6 * views), np.nan)
     return Points(unknown[:, :, 0].copy(), unknown[:, :, :3].copy(), unknown, unknown[:, 0, 0].copy(), reason)

@@ -32,8 +32,8 @@ PACKAGES = ("extractor", "cmpdesign")
 # A room imports only those that stand before it.
 ROOMS = {
     "cmpdesign": (
-        "errors libraries units workers watch inputs documents patterns design layout files reading calibration contact"
-        " scene products tracking evaluate data api proposal studio cli demo __main__"
+        "errors libraries units workers watch inputs documents patterns design layout files sensor reading calibration"
+        " contact scene products tracking evaluate data api proposal studio cli demo __main__"
     ),
     "extractor": (
         "errors frozen_record quality result presets numeric layout image cells localmap numbering refine complete"

@@ -101,8 +101,11 @@ def _print_summary(done: ReconstructDocument) -> None:
         rows["standard deviation"] = ", ".join(f"{axis} {value:.2f} um" for axis, value in axes)
     largest = done.largest_displacement
     if done.systematic_um is not None:
-        rows["systematic deviation"] = "of the largest displacement, by [medium_deviation]: " + ", ".join(
-            f"{axis} {value:.1f} um" for axis, value in zip("xyz", done.systematic_um, strict=True)
+        rows["systematic deviation"] = (
+            "of the largest displacement, by the deviations of the rig: "
+            + ", ".join(
+                f"{axis} {value:.1f} um" for axis, value in zip("xyz", done.systematic_um, strict=True)
+            )
         )
     if largest is not None:
         rows["largest displacement"] = (

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmpdesign.evaluate.simulated.sensor import ConditionRanges
 from cmpdesign.scene import Blob, Damage, Led, Light
+from cmpdesign.sensor.tables import ConditionRanges
 
 # Range of the gray level of a bubble or a grain of dirt, 0 to 255.
 SPECK_LEVEL = (40.0, 200.0)

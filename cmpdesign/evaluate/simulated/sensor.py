@@ -6,138 +6,44 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import ValidationError
 
-from cmpdesign.design.design import Design
-from cmpdesign.errors import CmpDesignError, DesignError, InputError
-from cmpdesign.inputs.documents import parse_toml
+from cmpdesign.errors import InputError
 from cmpdesign.inputs.files import path_exists, read_text
-from cmpdesign.inputs.names import Line, Name, nearest_name
+from cmpdesign.inputs.names import nearest_name
 from cmpdesign.inputs.validation import validation_message
-from extractor.image.response import light_of_values
+from cmpdesign.sensor.sensor_file import parse_sensor_file
+from cmpdesign.sensor.tables import (
+    METHODS,
+    ContactTable,
+    ElastomerTable,
+    Pixels,
+    Positive,
+    SensorError,
+    SensorResponse,
+    SensorTable,
+)
 
 if TYPE_CHECKING:
     from cmpdesign.contact import Elastomer
     from cmpdesign.scene import Medium, Pinhole
     from extractor.space.rig import Rig
 
-Positive = Annotated[float, Field(gt=0)]
-Share = Annotated[float, Field(ge=0, lt=1)]
-Pixels = Annotated[int, Field(ge=16, le=20_000)]
-Counts = tuple[Annotated[int, Field(ge=0, le=100)], Annotated[int, Field(ge=0, le=100)]]
-SensorResponse = Literal["srgb", "linear"] | float | tuple[float, ...]
-METHODS = ("square", "multicolor")
-OBJECTS = ("ball", "ring", "cylinder", "rib", "wedge", "large_ball", "cube")
 
+class SimulatedElastomer(ElastomerTable):
+    """An elastic layer whose modulus is needed."""
 
-class SensorError(CmpDesignError, ValueError):
-    """A sensor file that cannot be used."""
-
-
-class _StrictTable(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class ElastomerTable(_StrictTable):
-    """The elastic layer, bonded to the sensor's window."""
-
-    thickness_mm: Positive
     young_mpa: Positive
-    poisson: float = Field(0.5, ge=0, le=0.5)
-    marker_depth_mm: float = Field(0.0, ge=0)
-
-    @model_validator(mode="after")
-    def _within(self) -> ElastomerTable:
-        if self.marker_depth_mm >= self.thickness_mm:
-            raise ValueError(
-                f"marker_depth_mm is {self.marker_depth_mm:g}; it must be below thickness_mm, {self.thickness_mm:g}"
-            )
-        return self
 
 
-class ContactTable(_StrictTable):
-    """The solver's parameters of contacts."""
+class SimulatedTable(SensorTable):
+    """What a simulation needs of a sensor file."""
 
-    friction: float = Field(ge=0)
-    size_mm: tuple[Positive, Positive]
-    grid: int = Field(256, ge=16, le=2048)
-    steps: int = Field(8, ge=1, le=1000)
-
-
-class LoadTable(_StrictTable):
-    """One contact of the set for comparing designs; a positive twist is counter-clockwise from the front."""
-
-    object: str
-    press_mm: float = Field(ge=0)
-    shear_mm: tuple[float, float] = (0.0, 0.0)
-    twist_deg: float = Field(0.0, ge=-180, le=180)
-
-    @field_validator("object")
-    @classmethod
-    def _known(cls, value: str) -> str:
-        if value not in OBJECTS:
-            raise ValueError(f"{value!r} is no object; there are {', '.join(OBJECTS)}")
-        return value
-
-
-class ConditionRanges(_StrictTable):
-    """Ranges of imaging conditions, sampled uniformly in every trial."""
-
-    level: tuple[Positive, Positive] = (1.0, 1.0)
-    tint: Share = 0.0
-    gradient: Share = 0.0
-    vignetting: tuple[Share, Share] = (0.0, 0.0)
-    lamps: Counts = (0, 0)
-    lamp_level: Annotated[float, Field(ge=0)] = 0.0
-    blur_px: tuple[Annotated[float, Field(ge=0.1, le=20)], Annotated[float, Field(ge=0.1, le=20)]] = (1, 1)
-    noise: tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]] = (2.0, 2.0)
-    specks: Counts = (0, 0)
-    speck_radius_mm: tuple[Positive, Positive] = (0.1, 0.1)
-
-    @model_validator(mode="after")
-    def _in_order(self) -> ConditionRanges:
-        for name in ("level", "vignetting", "lamps", "blur_px", "noise", "specks", "speck_radius_mm"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise ValueError(f"{name} is [{low:g}, {high:g}]; give the smaller limit first")
-        return self
-
-
-class SensorTable(_StrictTable):
-    """The file without its [[view]] tables and its [medium], which the extractor's reader checks."""
-
-    name: Name = ""
-    description: Line = ""
-    source: Line = ""
     size_px: tuple[Pixels, Pixels]
-    patterns: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    elastomer: ElastomerTable
+    elastomer: SimulatedElastomer
     contact: ContactTable
-    response: str | float | tuple[float, ...] = "srgb"
-    load: tuple[LoadTable, ...] = ()
-    conditions: ConditionRanges = ConditionRanges()
-
-    @field_validator("patterns")
-    @classmethod
-    def _known_patterns(cls, value: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        for name, design in value.items():
-            if name not in METHODS:
-                raise ValueError(
-                    f"{name} is unknown{nearest_name(name, METHODS)}; there are {', '.join(METHODS)}"
-                )
-            try:
-                Design(**design)
-            except DesignError as error:
-                raise ValueError(f"{name}: {error}") from None
-        return value
-
-    @field_validator("response")
-    @classmethod
-    def _known_response(cls, value: str | float | tuple[float, ...]) -> str | float | tuple[float, ...]:
-        light_of_values(cast(SensorResponse, value))
-        return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +56,7 @@ class SimulatedSensor:
         text: the file's text.
     """
 
-    table: SensorTable
+    table: SimulatedTable
     rig: Rig
     text: str
 
@@ -253,19 +159,12 @@ def parse_sensor(text: str, where: str = "sensor") -> SimulatedSensor:
     Raises:
         SensorError: see ``load_sensor``.
     """
-    from extractor.errors import ExtractorError
-    from extractor.space.rig import parse_rig
-
+    sensor = parse_sensor_file(text, where)
+    rig = sensor.rig
     try:
-        document = parse_toml(text, where)
-        rig = parse_rig(text, where)
-        for name in ("view", "medium"):
-            document.pop(name, None)
-        table = SensorTable.model_validate(document)
-    except (InputError, ExtractorError) as error:
-        raise SensorError(str(error)) from None
+        table = SimulatedTable.model_validate(sensor.table.model_dump(exclude_unset=True))
     except ValidationError as error:
-        raise SensorError(f"{where}: {validation_message(error, SensorTable)}") from None
+        raise SensorError(f"{where}: {validation_message(error, SimulatedTable)}") from None
     for view in rig.views:
         if not view.placed:
             raise SensorError(

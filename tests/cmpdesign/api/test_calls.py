@@ -32,6 +32,7 @@ CALLS = {
     "calibrate force": "calibrate_force",
     "calibrate gel": "calibrate_gel",
     "calibrate pattern": "calibrate_pattern",
+    "calibrate rig": "calibrate_rig",
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
 }

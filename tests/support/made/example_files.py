@@ -37,6 +37,8 @@ def prepare_files(folder: Path, command: str) -> Path:
     """Write what the examples of a command name; each command has its own pattern under "layout.json"."""
     folder.mkdir()
     if command == "init":
+        (folder / "layout.json").write_text(small_text("honeycomb", LAYERS), encoding="utf-8")
+        (folder / "camera.toml").write_text(_view_text((900.0, 900.0), (639.5, 479.5), ()), encoding="utf-8")
         return folder
     (folder / "mine.toml").write_text('pattern = "honeycomb"\nlayers = 3\npitch_mm = 2.5\n', encoding="utf-8")
     match command:
@@ -108,9 +110,22 @@ def _write_sheet(folder: Path) -> None:
     """Pictures of a printed sheet, enough for a calibration, by one camera."""
     rng = np.random.default_rng(46)
     folder.mkdir()
-    pictures = take_pictures(random_camera(rng, 60, 61), nominal_layout(), SHEET_PICTURES, Conditions(), rng)
+    camera = random_camera(rng, 60, 61)
+    pictures = take_pictures(camera, nominal_layout(), SHEET_PICTURES, Conditions(), rng)
     for number, picture in enumerate(pictures):
         cv2.imwrite(str(folder / f"{number}.png"), picture)
+    # the same camera's rig, with the sheet as the pad
+    cv2.imwrite(str(folder.parent / "pad.png"), pictures[0])
+    true = camera.pinhole
+    text = _view_text(true.focal_px, true.centre_px, true.distortion)
+    (folder.parent / "measured.toml").write_text(text, encoding="utf-8")
+
+
+def _view_text(focal_px: Sequence[float], centre_px: Sequence[float], distortion: Sequence[float]) -> str:
+    return (
+        f'size_px = [1280, 960]\n\n[[view]]\nname = "camera"\nfocal_px = {[*map(float, focal_px)]}\n'
+        f"centre_px = {[*map(float, centre_px)]}\ndistortion = {[*map(float, distortion or [0.0] * 5)]}\n"
+    )
 
 
 def _write_coupon(folder: Path) -> None:

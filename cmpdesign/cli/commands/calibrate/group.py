@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from cmpdesign.cli.command import Command, Group, examples
-from cmpdesign.cli.commands.calibrate import camera, force, gel, pattern
+from cmpdesign.cli.commands.calibrate import camera, force, gel, pattern, rig
 
 app = typer.Typer(
     cls=Group,
@@ -20,3 +20,4 @@ app.command("camera", cls=Command, epilog=examples(*camera.EXAMPLES))(camera.cam
 app.command("force", cls=Command, epilog=examples(*force.EXAMPLES))(force.force)
 app.command("gel", cls=Command, epilog=examples(*gel.EXAMPLES))(gel.gel)
 app.command("pattern", cls=Command, epilog=examples(*pattern.EXAMPLES))(pattern.pattern)
+app.command("rig", cls=Command, epilog=examples(*rig.EXAMPLES))(rig.rig)

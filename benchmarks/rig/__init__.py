@@ -1,0 +1,1 @@
+"""What each step of a sensor's calibration gains in depth."""

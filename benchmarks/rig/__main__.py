@@ -1,0 +1,7 @@
+"""``python -m benchmarks.rig``."""
+
+import sys
+
+from benchmarks.rig.run import main
+
+sys.exit(main())
