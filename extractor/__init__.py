@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from extractor.space.reconstruction import Reconstructor, Shape
     from extractor.space.rig import Deviation, Rig, load_rig, parse_rig
     from extractor.space.triangulation import PointReason, triangulate
-    from extractor.space.views import ShapeFrame, ShapeTracker, ViewExtractor
+    from extractor.space.views import ContactTracker, ShapeFrame, ShapeTracker, ViewExtractor
     from extractor.track.displacement import Rest
     from extractor.track.tracker import FrameStatus, StartKind, Tracked, Tracker
 
@@ -48,6 +48,7 @@ __all__ = [
     "ContactForce",
     "ContactReader",
     "ContactReason",
+    "ContactTracker",
     "Deviation",
     "Extractor",
     "ExtractorError",
@@ -98,6 +99,7 @@ _HOMES = {
     "ContactForce": "extractor.contact",
     "ContactReader": "extractor.contact",
     "ContactReason": "extractor.contact",
+    "ContactTracker": "extractor.space.views",
     "Deviation": "extractor.space.rig",
     "Extractor": "extractor.pipeline",
     "Field": "extractor.space.field",

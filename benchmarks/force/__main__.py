@@ -1,82 +1,151 @@
-"""``python -m benchmarks.force``: force, torque and centre of the finite-element frames, as the reader finds them."""
+"""``python -m benchmarks.force``: force, torque and regions of the finite-element frames, as the reader finds them."""
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.table import Table
 
-from benchmarks.force.truth import FRICTION, TRUTH, YOUNG_MPA, cases
+from benchmarks.force.seen import seen_from
+from benchmarks.force.truth import FRICTION, TRUTH, YOUNG_MPA, Case, cases
 from benchmarks.support.command import wide_console
+from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.finite_block import make_gel
 from cmpdesign.design.design import load_design
-from cmpdesign.layout.build import build_layout
-from extractor.contact import ContactReader
+from extractor import ContactForce, ContactReader
 
-SIGMA_MM = np.array([0.001, 0.001, 0.003])
-DEPTH_PLACE, DEPTH_MM = 1, 0.5  # of ``DEPTHS_MM``
+Array = NDArray[np.float64]
+DEPTH_PLACE, DEPTH_MM = 0, 0.5  # of ``DEPTHS_MM``
+LEAST_N = 0.3  # of the summary's frames
+FLAT = ("twist", "punch", "ring")  # their touched area is not that of a ball
+
+
+class Errors(NamedTuple):
+    """One frame: errors as shares of the press, z in stated deviations, lengths in mm.
+
+    The share of the torque is that of the largest torque of the press on its contact's radius and of the truth.
+    """
+
+    name: str
+    press_n: float
+    normal: float
+    normal_z: float
+    shear: float
+    shear_z: Array
+    torque: float
+    torque_z: Array
+    centre_mm: float
+    radius: float
+    utilisation: float
+    regions: int
+    cold_ms: float
+    warm_ms: float
+
+
+def errors_of(found: ContactForce, frame: dict[str, Array], name: str, times_ms: list[float]) -> Errors:
+    """The errors of one frame of the truth."""
+    press, error = -float(frame["force_n"][2]), found.force_n - frame["force_n"]
+    sigma, torque_sigma = (np.sqrt(np.diag(cov)) for cov in (found.force_cov_n2, found.torque_cov_nmm2))
+    torque = found.torque_nmm - frame["torque_nmm"]
+    radius_mm = float(np.sqrt(frame["area_mm2"][0] / np.pi))
+    size = max(float(np.linalg.norm(frame["torque_nmm"])), press * radius_mm)
+    centres = [region.centre_mm for region in found.regions] or [np.full(2, np.nan)]
+    off = np.hypot(*(centres[0] - frame["centre_mm"]).T)
+    areas = [region.area_mm2 for region in found.regions] or [np.nan]
+    return Errors(
+        name,
+        press,
+        -float(error[2]) / press,
+        float(error[2] / sigma[2]),
+        float(np.hypot(*error[:2])) / press,
+        error[:2] / sigma[:2],
+        float(np.linalg.norm(torque)) / size,
+        torque / torque_sigma,
+        float(off.min()),
+        np.nan if name in FLAT else float(np.sqrt(areas[0] / np.pi)) / radius_mm - 1,
+        found.utilisation - float(frame["utilisation"]),
+        len(found.regions),
+        *times_ms,
+    )
+
+
+@cache
+def _reader(thickness_mm: float, poisson: float) -> ContactReader:
+    layout, layer = build_layout(load_design("honeycomb")), Elastomer(thickness_mm, 1.0, poisson, DEPTH_MM)
+    return ContactReader(layout, make_gel(layout, layer), YOUNG_MPA, friction=FRICTION)
+
+
+def read_case(
+    case: Case, frames: list[dict[str, Array]], random: np.random.Generator, far_mm: float | None
+) -> Iterator[Errors]:
+    """The frames of a contact, read from two views' displacements, or from one view far away."""
+    seen = seen_from(_reader(case.thickness_mm, case.poisson), far_mm)
+    for frame in frames:
+        moved, times_ms = frame["displacement_mm"][DEPTH_PLACE].astype(np.float64), []
+        seen.reader.reset()
+        for _ in range(2):
+            start = time.process_time()
+            found = seen.read(moved, random)
+            times_ms.append(1e3 * (time.process_time() - start))
+        yield errors_of(found, frame, case.name, times_ms)
 
 
 def main() -> int:
-    """Print one row for every frame: markers 0.5 mm deep, noise of 1, 1 and 3 um."""
+    """Print one row for every frame, markers 0.5 mm deep, and the summary of the frames above 0.3 N."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--truth", type=Path, default=TRUTH, help="file of `python -m benchmarks.force.truth`"
     )
+    parser.add_argument("--one-view", type=float, metavar="MM", help="distance of a single camera")
+    parser.add_argument("--only", nargs="*", default=[case.name for case in cases()])
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     with np.load(args.truth) as file:
         truth = dict(file)
-    layout = build_layout(load_design("honeycomb"))
-    cov = np.tile(np.diag(SIGMA_MM**2), (len(layout.marker_xy_mm), 1, 1))
     random = np.random.default_rng(args.seed)
-    table = Table(
-        "contact", "Fz, N", "error", "z", "shear error / Fz", "torque z", "centre, um", "cold ms", "warm ms"
-    )
-    errors = []
+    found: list[Errors] = []
     for case in cases():
         mine = np.flatnonzero(truth["case"] == case.name)
-        if not len(mine):
-            continue
-        layer = Elastomer(case.thickness_mm, YOUNG_MPA, case.poisson, DEPTH_MM)
-        reader = ContactReader(layout, make_gel(layout, layer), YOUNG_MPA, friction=FRICTION)
-        for frame in mine:
-            moved = truth["displacement_mm"][frame, DEPTH_PLACE] + SIGMA_MM * random.normal(
-                size=(len(cov), 3)
-            )
-            times = []
-            for cold in (True, False):
-                if cold:
-                    reader.reset()
-                start = time.process_time()
-                found = reader.read(moved, cov)
-                times.append(1e3 * (time.process_time() - start))
-            force = truth["force_n"][frame]
-            error = found.force_n - force
-            relative = error[2] / force[2]
-            errors.append(relative)
-            torque = found.torque_nmm - truth["torque_nmm"][frame]
-            z = torque / np.sqrt(np.diag(found.torque_cov_nmm2))
-            centre = found.regions[0].centre_mm if found.regions else np.full(2, np.nan)
-            off = np.hypot(*(centre - truth["centre_mm"][frame]).T).min()
-            table.add_row(
-                case.name,
-                f"{-force[2]:.3f}",
-                f"{relative:+.1%}",
-                f"{error[2] / np.sqrt(found.force_cov_n2[2, 2]):+.1f}",
-                f"{np.hypot(*error[:2]) / -force[2]:.1%}",
-                f"{np.sqrt((z**2).mean()):.1f}",
-                f"{1e3 * off:.0f}",
-                *(f"{value:.1f}" for value in times),
-            )
-    console = wide_console()
+        if len(mine) and case.name in args.only:
+            frames = [{key: values[k] for key, values in truth.items()} for k in mine]
+            found += read_case(case, frames, random, args.one_view)
+    table = Table(
+        "contact", "Fz, N", "error", "z", "shear", "torque", "torque z", "centre, um", "radius", "utilisation",
+        "regions", "cold ms", "warm ms",
+    )  # fmt: skip
+    for one in found:
+        table.add_row(
+            one.name, f"{one.press_n:.3f}", f"{one.normal:+.1%}", f"{one.normal_z:+.1f}", f"{one.shear:.1%}",
+            f"{one.torque:.1%}", f"{np.sqrt((one.torque_z**2).mean()):.1f}", f"{1e3 * one.centre_mm:.0f}",
+            f"{one.radius:+.0%}", f"{one.utilisation:+.3f}", str(one.regions),
+            f"{one.cold_ms:.1f}", f"{one.warm_ms:.1f}",
+        )  # fmt: skip
+    console = wide_console(150)
     console.print(table)
-    console.print(f"Fz: rms {np.sqrt(np.mean(np.square(errors))):.1%}, worst {np.abs(errors).max():.1%}")
+    for line in summary_lines([one for one in found if one.press_n > LEAST_N]):
+        console.print(line)
     return 0
+
+
+def summary_lines(found: list[Errors]) -> Iterator[str]:
+    """Root mean square and worst of every error, and z."""
+    yield f"{len(found)} frames above {LEAST_N} N"
+    for name in ("normal", "shear", "torque", "centre_mm", "radius", "utilisation"):
+        values = np.array([getattr(one, name) for one in found])
+        values = values[np.isfinite(values)]
+        text = f"rms {np.sqrt((values**2).mean()):.3f}, worst {np.abs(values).max():.3f}"
+        if hasattr(found[0], f"{name}_z"):
+            z = np.concatenate([np.atleast_1d(getattr(one, f"{name}_z")) for one in found])
+            text += f", z {np.sqrt((z**2).mean()):.2f}"
+        yield f"{name}: {text}"
 
 
 if __name__ == "__main__":

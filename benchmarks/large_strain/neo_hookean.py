@@ -20,6 +20,7 @@ RADIUS_MM, FAR_MM = 10.0, 24.0
 PENALTY_PER_MODULUS = 2500.0
 NEWTON_TOLERANCE_MM, LARGEST_NEWTON_STEP_MM, MOST_NEWTON_STEPS = 1e-5, 0.15, 60
 PRESS_STEP_MM = 0.1
+NEAR_MM = np.linspace(0, 9, 28)  # nodes from the axis
 
 
 class Moved(NamedTuple):
@@ -77,8 +78,9 @@ def _coupling(u: Any, q: Any, w: Any) -> Any:
 def _ball(u: Any, w: Any) -> tuple[Array, Array, Array]:
     """Depth of the surface inside the ball, and the ball's slope and curvature there."""
     at = w.x[0] + u[0]
-    root = np.sqrt(RADIUS_MM**2 - np.minimum(at, 0.9 * RADIUS_MM) ** 2)
-    return np.maximum(u[1] - (RADIUS_MM - root - w["press"]), 0.0), at / root, RADIUS_MM**2 / root**3
+    radius = w["radius"]
+    root = np.sqrt(radius**2 - np.minimum(at, 0.9 * radius) ** 2)
+    return np.maximum(u[1] - (radius - root - w["press"]), 0.0), at / root, radius**2 / root**3
 
 
 @skfem.LinearForm
@@ -97,10 +99,13 @@ def _pushing_stiffness(u: Any, v: Any, w: Any) -> Any:
 class NeoHookeanLayer:
     """Taylor-Hood quadrilaterals in the half-plane (r, z); total Lagrangian, Newton's method; the ball by a penalty."""
 
-    def __init__(self, elastomer: Elastomer = LAYER) -> None:
-        self.elastomer = elastomer
+    def __init__(
+        self, elastomer: Elastomer = LAYER, radius_mm: float = RADIUS_MM, near_mm: Array = NEAR_MM
+    ) -> None:
+        self.elastomer, self.radius_mm = elastomer, radius_mm
+        self.penalty = PENALTY_PER_MODULUS * elastomer.shear_mpa
         h = elastomer.thickness_mm
-        across = np.concatenate([np.linspace(0, 9, 28), np.geomspace(9, FAR_MM, 9)[1:]])
+        across = np.concatenate([near_mm, np.geomspace(near_mm[-1], FAR_MM, 9)[1:]])
         up = -h * np.array([1.0, 0.85, 0.65, 0.45, 0.28, 0.13, 0.05, 0.0])
         mesh = skfem.MeshQuad.init_tensor(across, up)
         element = skfem.ElementVector(skfem.ElementQuad2())
@@ -129,7 +134,7 @@ class NeoHookeanLayer:
 
     def _solve(self, at: Array, press_mm: float) -> Array:
         mu, n = self.elastomer.shear_mpa, self.basis.N
-        contact = {"press": press_mm, "penalty": PENALTY_PER_MODULUS * mu / 1.0}
+        contact = {"press": press_mm, "penalty": self.penalty, "radius": self.radius_mm}
         r = np.asarray(self.basis.global_coordinates())[0]
         for _ in range(MOST_NEWTON_STEPS):
             f = _gradient(self.basis.interpolate(at[:n]), r) + np.eye(3)[:, :, None, None]

@@ -23,7 +23,7 @@ from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.runs import FramesPart, ReconstructDocument, TrackDocument
+    from cmpdesign.documents.runs import ContactPart, FramesPart, ReconstructDocument, TrackDocument
     from cmpdesign.tracking.jobs.job import Job
     from cmpdesign.tracking.live.view import LiveCount
     from cmpdesign.tracking.run import TrackingRun
@@ -76,6 +76,18 @@ def frames_text(frames: FramesPart) -> str:
     others = {name: getattr(frames, name) for name in ("lost", "unreadable", "other_size")}
     not_tracked = "".join(f", {count} {name.replace('_', ' ')}" for name, count in others.items() if count)
     return f"{frames.read} read, {frames.tracked} tracked{not_tracked}"
+
+
+def contact_text(contact: ContactPart) -> str:
+    """The contacts of a run, in words."""
+    reasons = contact.reasons.items()
+    text = ", ".join(f"{count} x {reason.replace('_', ' ')}" for reason, count in reasons)
+    press = contact.largest
+    if press is None:
+        return text
+    pairs = zip(press.force_n, press.force_sigma_n, strict=True)
+    force = ", ".join(f"{value:.3f} ± {sigma:.3f}" for value, sigma in pairs)
+    return f"{text}; largest ({force}) N in frame {press.frame}"
 
 
 def run_with_progress(run: TrackingRun, doing: str) -> None:

@@ -71,6 +71,22 @@ class TimesPart(Part):
     camera_clock_s: float | None = Field(description="The camera's own clock when time_s was 0.")
 
 
+class PressPart(Part):
+    """The frame with the largest press."""
+
+    frame: int
+    force_n: tuple[float, float, float]
+    force_sigma_n: tuple[float, float, float] = Field(description="Standard deviations.")
+    regions: int
+
+
+class ContactPart(Part):
+    """The contacts of a run."""
+
+    reasons: dict[str, int] = Field(description="Reasons of contacts -> number of frames.")
+    largest: PressPart | None
+
+
 class TrackDocument(Document):
     """The summary of ``track``; also the file FILE.summary.json."""
 
@@ -94,6 +110,7 @@ class TrackDocument(Document):
         description="Scatter of a marker at rest, per axis; null with too few resting frames."
     )
     jitter_pairs: int
+    contact: ContactPart | None = Field(None, description="With --contact.")
     largest_displacement: LargestPart | None
     times: TimesPart
     live: LivePart | None = Field(None, description="With --live.")
@@ -114,22 +131,6 @@ class PositionsPart(Part):
     of: Literal["pattern"]
     depth_mm: float | None = Field(description="Depth of the pattern below the touched surface.")
     continued_to_surface: bool
-
-
-class PressPart(Part):
-    """The frame with the largest press."""
-
-    frame: int
-    force_n: tuple[float, float, float]
-    force_sigma_n: tuple[float, float, float] = Field(description="Standard deviations.")
-    regions: int
-
-
-class ContactPart(Part):
-    """The contacts of a run."""
-
-    reasons: dict[str, int] = Field(description="Reasons of contacts -> number of frames.")
-    largest: PressPart | None
 
 
 class ReconstructDocument(Document):

@@ -38,6 +38,7 @@ class ElastomerTable(_StrictTable):
     young_sigma_mpa: float = Field(0.0, ge=0)
     poisson: float = Field(0.5, ge=0, le=0.5)
     marker_depth_mm: float = Field(0.0, ge=0)
+    friction: Positive | None = Field(None, description="Coefficient of friction, for the utilisation.")
     gel: str | None = Field(None, min_length=1, description="The file of calibrate gel.")
 
     @model_validator(mode="after")

@@ -30,6 +30,7 @@ FORCE_COLUMNS = (
 # Column -> shape of one region's values.
 REGION_COLUMNS: Mapping[str, tuple[int, ...]] = {
     "region_area_mm2": (),
+    "region_area_sigma_mm2": (),
     "region_centre_mm": (2,),
     "region_centre_cov_mm2": (3,),
     "region_force_n": (3,),

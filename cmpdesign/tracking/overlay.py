@@ -20,6 +20,8 @@ Picture = NDArray[np.uint8]
 
 EMPTY_SIZE = (640, 480)  # (width, height) of the video when its first frame has no image, px
 WAY_BGR = (255, 200, 0)
+PRESSURE_BGR = (60, 60, 240)
+LEAST_PRESSURE = 0.05  # of the largest pressure, below which a marker has no disc
 FIXED_BITS = 4  # OpenCV draws with 4 fractional bits
 
 
@@ -86,6 +88,10 @@ def draw_frame(
         if rest is not None:
             _draw_ways(picture, rest.xy_px, frame.markers.xy_px, picture.shape[1] // image.shape[1])
             parts.append(CaptionPart("way from the place at rest", WAY_BGR, "line"))
+        if frame.contact is not None and frame.contact.regions:
+            pressure_mpa = -frame.contact.marker_traction_mpa[:, 2]
+            _draw_pressure(picture, frame.markers.xy_px, pressure_mpa, picture.shape[1] // image.shape[1])
+            parts.append(CaptionPart("pressure", PRESSURE_BGR))
     draw_caption(picture, parts, at_top=True)
     return picture
 
@@ -94,7 +100,13 @@ def _frame_text(frame: Tracked) -> str:
     time = "" if np.isnan(frame.time_s) else f"  {frame.time_s:.3f} s"
     start = f"  {frame.start}" if frame.start else ""
     reason = f"  {frame.reason}" if frame.reason else ""
-    return f"frame {frame.index}{time}  {frame.status.name.lower().replace('_', ' ')}{start}{reason}"
+    force = ""
+    if frame.contact is not None and frame.contact.regions:
+        sigmas = np.sqrt(np.diag(frame.contact.force_cov_n2))
+        pairs = zip("xyz", frame.contact.force_n, sigmas, strict=True)
+        force = "  " + ", ".join(f"F{axis} {value:.2f} +- {sigma:.2f} N" for axis, value, sigma in pairs)
+    status = frame.status.name.lower().replace("_", " ")
+    return f"frame {frame.index}{time}  {status}{start}{force}{reason}"
 
 
 def _draw_ways(
@@ -106,6 +118,26 @@ def _draw_ways(
     known = np.isfinite(ends).all(axis=(1, 2))
     fixed = np.round(((ends[known] + 0.5) * scale - 0.5) * (1 << FIXED_BITS)).astype(np.int32)
     cv2.polylines(picture, list(fixed), False, WAY_BGR, 1, cv2.LINE_AA, FIXED_BITS)
+
+
+def _draw_pressure(
+    picture: Picture, xy_px: NDArray[np.float64], pressure_mpa: NDArray[np.float64], scale: int
+) -> None:
+    """A disc at every marker under pressure: its area is proportional to the pressure."""
+    import cv2
+
+    largest = float(np.nanmax(pressure_mpa, initial=0.0))
+    shown = np.isfinite(xy_px[:, 0]) & (pressure_mpa > LEAST_PRESSURE * largest)
+    if not shown.any():
+        return
+    known = xy_px[np.isfinite(xy_px[:, 0])]
+    reach = scale * float(np.sqrt(np.ptp(known, axis=0).prod() / len(known)))
+    discs = picture.copy()
+    for place, pressure in zip(xy_px[shown], pressure_mpa[shown], strict=True):
+        middle = np.round(((place + 0.5) * scale - 0.5) * (1 << FIXED_BITS)).astype(int).tolist()
+        radius = round(0.5 * reach * float(np.sqrt(pressure / largest)) * (1 << FIXED_BITS))
+        cv2.circle(discs, middle, radius, PRESSURE_BGR, -1, cv2.LINE_AA, FIXED_BITS)
+    cv2.addWeighted(discs, 0.5, picture, 0.5, 0.0, dst=picture)
 
 
 def _letterbox(picture: Picture, size: tuple[int, int]) -> Picture:

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cmpdesign.tracking.summary import percentiles
+from cmpdesign.tracking.summary import ContactStatistics, percentiles
 
 if TYPE_CHECKING:
-    from extractor.contact import ContactForce
     from extractor.space.reconstruction import Reconstructor
     from extractor.space.views import ShapeFrame
 
@@ -21,39 +20,6 @@ class _LargestDisplacement(NamedTuple):
     mm: float = -1.0
     frame: int = -1
     marker: int = -1
-
-
-class ContactStatistics:
-    """The statistics of the contacts of frames."""
-
-    def __init__(self) -> None:
-        self._reasons: Counter[str] = Counter()
-        self._largest: tuple[int, ContactForce] | None = None
-
-    def add(self, frame: int, contact: ContactForce | None) -> None:
-        """Count a frame's contact, if contacts are read."""
-        if contact is None:
-            return
-        self._reasons[contact.reason.name.lower()] += 1
-        press_n = -float(contact.force_n[2])
-        if contact.regions and (self._largest is None or press_n > -self._largest[1].force_n[2]):
-            self._largest = (frame, contact)
-
-    def to_json(self) -> dict[str, Any] | None:
-        """Numbers of frames by reason, and the frame with the largest press; None where no contact is read."""
-        if not self._reasons:
-            return None
-        largest = None
-        if self._largest is not None:
-            frame, contact = self._largest
-            sigma_n = np.sqrt(np.diag(contact.force_cov_n2))
-            largest = {
-                "frame": frame,
-                "force_n": contact.force_n.tolist(),
-                "force_sigma_n": sigma_n.tolist(),
-                "regions": len(contact.regions),
-            }
-        return {"reasons": dict(sorted(self._reasons.items())), "largest": largest}
 
 
 class ShapeStatistics:

@@ -10,6 +10,7 @@ import numpy as np
 from cmpdesign.reading.quality import median_quality, quality_to_json
 
 if TYPE_CHECKING:
+    from extractor.contact import ContactForce
     from extractor.layout.reference import Reference
     from extractor.quality import Quality
     from extractor.track.displacement import Rest
@@ -26,6 +27,39 @@ class _LargestDisplacement(NamedTuple):
     frame: int = -1
     marker: int = -1
     mm: float = float("nan")
+
+
+class ContactStatistics:
+    """The statistics of the contacts of frames."""
+
+    def __init__(self) -> None:
+        self._reasons: Counter[str] = Counter()
+        self._largest: tuple[int, ContactForce] | None = None
+
+    def add(self, frame: int, contact: ContactForce | None) -> None:
+        """Count a frame's contact, if contacts are read."""
+        if contact is None:
+            return
+        self._reasons[contact.reason.name.lower()] += 1
+        press_n = -float(contact.force_n[2])
+        if contact.regions and (self._largest is None or press_n > -self._largest[1].force_n[2]):
+            self._largest = (frame, contact)
+
+    def to_json(self) -> dict[str, Any] | None:
+        """Numbers of frames by reason, and the frame with the largest press; None where no contact is read."""
+        if not self._reasons:
+            return None
+        largest = None
+        if self._largest is not None:
+            frame, contact = self._largest
+            sigma_n = np.sqrt(np.diag(contact.force_cov_n2))
+            largest = {
+                "frame": frame,
+                "force_n": contact.force_n.tolist(),
+                "force_sigma_n": sigma_n.tolist(),
+                "regions": len(contact.regions),
+            }
+        return {"reasons": dict(sorted(self._reasons.items())), "largest": largest}
 
 
 class TrackStatistics:
@@ -45,6 +79,7 @@ class TrackStatistics:
         self._qualities: list[Quality] = []
         self._resting: Tracked | None = None
         self._pairs, self._squares, self._values = 0, 0.0, 0
+        self._contacts = ContactStatistics()
         self._largest = _LargestDisplacement()
         self.farthest: Tracked | None = None
 
@@ -64,6 +99,7 @@ class TrackStatistics:
         self._statuses[frame.status.name.lower()] += 1
         self._reasons[frame.reason] += 1
         self._starts[frame.start or "none"] += 1
+        self._contacts.add(frame.index, frame.contact)
         self._markers += np.bincount(frame.markers.status[self._reference.present], minlength=4)
         if frame.markers.found and frame.markers.quality is not None:
             self._qualities.append(frame.markers.quality)
@@ -129,6 +165,7 @@ class TrackStatistics:
             "quality": quality_to_json(median_quality(self._qualities)),
             "jitter_px": self.jitter_px,
             "jitter_pairs": self._pairs,
+            "contact": self._contacts.to_json(),
             "largest_displacement": self._largest_json(),
         }
 

@@ -15,10 +15,19 @@ from cmpdesign.tracking.columns import (
     time_columns,
     unknown_times,
 )
+from cmpdesign.tracking.force_table import FORCE_DIGITS, force_about, force_columns, force_long_form
 from cmpdesign.tracking.sources.frame_source import SourceTimes
 
 if TYPE_CHECKING:
+    from extractor.contact import ContactReader
+    from extractor.space.views import ContactTracker
     from extractor.track.tracker import Tracked, Tracker
+
+
+DIGITS: Mapping[str, int] = {name: 0 for name in ("marker", "layer", "index", "status")} | {
+    "x_px": 5, "y_px": 5, "cov_xx_px2": 8, "cov_xy_px2": 8, "cov_yy_px2": 8,
+    "dx_px": 5, "dy_px": 5, "dx_mm": 6, "dy_mm": 6,
+}  # fmt: skip
 
 
 class TrackTable:
@@ -27,21 +36,27 @@ class TrackTable:
     Args:
         tracker: its layout and rest frame are the shared columns.
         times: gives how the frames' times were found, for the shared columns.
+        contact: the reader whose forces the frames hold, for further columns; None: frames without forces.
     """
 
-    digits: Mapping[str, int] = {name: 0 for name in ("marker", "layer", "index", "status")} | {
-        "x_px": 5, "y_px": 5, "cov_xx_px2": 8, "cov_xy_px2": 8, "cov_yy_px2": 8,
-        "dx_px": 5, "dy_px": 5, "dx_mm": 6, "dy_mm": 6,
-    }  # fmt: skip
-
-    def __init__(self, tracker: Tracker, times: Callable[[], SourceTimes] = unknown_times) -> None:
-        self._tracker, self._times = tracker, times
+    def __init__(
+        self,
+        tracker: Tracker | ContactTracker,
+        times: Callable[[], SourceTimes] = unknown_times,
+        contact: ContactReader | None = None,
+    ) -> None:
+        self._tracker, self._times, self._contact = tracker, times, contact
+        self.digits: Mapping[str, int] = DIGITS if contact is None else {**DIGITS, **FORCE_DIGITS}
 
     def batch(self, frames: Sequence[Tracked]) -> Columns:
-        return frame_columns(frames)
+        columns = frame_columns(frames)
+        if self._contact is not None:
+            columns |= force_columns([frame.contact for frame in frames if frame.contact is not None])
+        return columns
 
     def about(self) -> Columns:
-        return fixed_columns(self._tracker) | time_columns(self._times())
+        columns = fixed_columns(self._tracker) | time_columns(self._times())
+        return columns if self._contact is None else columns | force_about(self._contact)
 
 
 def table_long_form(columns: Columns, fixed: Columns) -> Columns:
@@ -67,7 +82,7 @@ def frame_columns(frames: Sequence[Tracked]) -> Columns:
     }
 
 
-def fixed_columns(tracker: Tracker) -> Columns:
+def fixed_columns(tracker: Tracker | ContactTracker) -> Columns:
     """The shared columns: the layout, and the rest frame (NaN where unknown so far)."""
     reference, rest = tracker.layout, tracker.rest
     unknown = np.full((3, 3), np.nan)
@@ -102,4 +117,5 @@ def track_long_form(columns: Columns, fixed: Columns) -> Columns:
         long[x], long[y] = columns[name][..., 0].reshape(-1), columns[name][..., 1].reshape(-1)
     for place, name in enumerate(("cov_xx_px2", "cov_xy_px2", "cov_yy_px2")):
         long[name] = columns["cov_px2"][..., place].reshape(-1)
-    return {name: long[name] for name in (*HEAD, *TrackTable.digits)}
+    ordered = {name: long[name] for name in (*HEAD, *DIGITS)}
+    return ordered | force_long_form(columns, count) if "force_n" in columns else ordered

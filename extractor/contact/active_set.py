@@ -64,40 +64,50 @@ class Solution:
 
 
 class TractionSolver:
-    """Solves for tractions in Young's moduli. It keeps no state between frames."""
+    """Solves for tractions in Young's moduli. It keeps no state between frames.
 
-    def __init__(self, gel: Gel, limits: Limits = LIMITS) -> None:
+    Args:
+        gel: the pad's Green's matrix.
+        seen: (M, C, 3) derivatives of the C measured numbers of a marker by its displacement; None: the displacement.
+        limits: thresholds.
+    """
+
+    def __init__(self, gel: Gel, seen: Array | None = None, limits: Limits = LIMITS) -> None:
         self._limits = limits
         markers, loads = gel.matrix.shape[0] // 3, len(gel.loads_mm)
-        self._matrix = gel.matrix.reshape(markers, 3, loads, 3)
-        by_load = np.ascontiguousarray(self._matrix.transpose(2, 3, 0, 1)).reshape(loads, 3, 3 * markers)
+        matrix = gel.matrix.reshape(markers, 3, loads * 3)
+        if seen is not None:
+            matrix = seen.astype(np.float32) @ matrix
+        self._axes = matrix.shape[1]
+        matrix = matrix.reshape(markers * self._axes, loads, 3)
+        by_load = np.ascontiguousarray(matrix.transpose(1, 2, 0))
         self._by_load = by_load
         # pressure is minus the traction in z
         self._press = np.ascontiguousarray(-by_load[:, 2])
-        self._squares = (self._press.reshape(loads, markers, 3).astype(np.float64) ** 2).sum(axis=1)
+        self._squares = (self._press.reshape(loads, markers, -1).astype(np.float64) ** 2).sum(axis=1)
         self._neighbours = _neighbours(gel.loads_mm, gel.spacing_mm)
         self._coarse = _thinned(gel.loads_mm, gel.spacing_mm)
         coarse = self._press[self._coarse].astype(np.float64)
         self._coarse_gram = coarse @ coarse.T
         self._coarse_step = 1.0 / np.linalg.eigvalsh(self._coarse_gram)[-1]
 
-    def solve(self, displacement_mm: Array, whitening: Array, start: Ids | None) -> Solution | None:
+    def solve(self, measured: Array, whitening: Array, start: Ids | None) -> Solution | None:
         """The tractions; None where nothing presses.
 
         Args:
-            displacement_mm: (M, 3) of the markers; 0 where unknown.
-            whitening: (M, 3, 3) of which the transpose times itself is the inverse covariance; 0 where unknown.
+            measured: (M, C) of the markers; 0 where unknown.
+            whitening: (M, C, C) of which the transpose times itself is the inverse covariance; 0 where unknown.
             start: (S,) support of the frame before; None: a cold start.
         """
-        white = np.einsum("mij,mj->mi", whitening, displacement_mm)
-        known = max(3, int((np.abs(whitening).max(axis=(1, 2)) > 0).sum()) * 3)
-        weight = np.einsum("mij,mij->j", whitening, whitening) / (known / 3)
-        curvature = self._squares @ weight * (known / len(white) / 3) + self._limits.tau**-2
+        white = np.einsum("mij,mj->mi", whitening, measured)
+        known = max(3, int((np.abs(whitening).max(axis=(1, 2)) > 0).sum()) * self._axes)
+        weight = np.einsum("mij,mij->j", whitening, whitening) / len(white)
+        curvature = self._squares @ weight + self._limits.tau**-2
         gain = self._gains(white, whitening, curvature)
         largest = float(gain.max())
         if largest < self._limits.gain_elsewhere:
             return None
-        support = self._cold_start(displacement_mm) if start is None or not len(start) else start
+        support = self._cold_start(measured) if start is None or not len(start) else start
         for _ in range(self._limits.rounds):
             support, traction, inverse, residual = self._settle(white, whitening, support)
             chi = max(1.0, float(np.sqrt((residual**2).sum() / known)))
@@ -137,9 +147,9 @@ class TractionSolver:
         back = np.einsum("mij,mi->mj", whitening, white).reshape(-1).astype(np.float32)
         return np.asarray(np.maximum(self._press @ back, 0.0) / np.sqrt(curvature))
 
-    def _cold_start(self, displacement_mm: Array) -> Ids:
+    def _cold_start(self, measured: Array) -> Ids:
         """Loads that press after a projected gradient of pressure alone, one load a marker (Nesterov 1983)."""
-        right = self._press[self._coarse] @ displacement_mm.reshape(-1).astype(np.float32)
+        right = self._press[self._coarse] @ measured.reshape(-1).astype(np.float32)
         at = ahead = np.zeros(len(right))
         for k in range(self._limits.descents):
             after = np.maximum(ahead + self._coarse_step * (right - self._coarse_gram @ ahead), 0.0)
@@ -154,7 +164,7 @@ class TractionSolver:
         blocks = np.einsum(
             "mij,smaj->mias",
             whitening,
-            self._by_load[support].reshape(len(support), 3, -1, 3).transpose(0, 2, 1, 3),
+            self._by_load[support].reshape(len(support), 3, -1, self._axes).transpose(0, 2, 1, 3),
             optimize=True,
         )
         columns = blocks.reshape(white.size, 3, len(support)).transpose(0, 2, 1).reshape(white.size, -1)

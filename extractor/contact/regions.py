@@ -12,7 +12,13 @@ from extractor.contact.gel import Gel
 
 Array = NDArray[np.float64]
 FINE = 4  # cells of the picture of the pressure per spacing of the loads; chosen
-TOUCHED_SHARE = 0.25  # of a region's largest pressure, above which a place is touched; chosen
+HERTZ = (
+    2.5  # square of a contact's radius over the mean square distance of its pressure from the centre. Derived
+)
+RESOLVED_SPACINGS = (
+    3.0  # radius in spacings of loads from which the shape of the pressure is resolved. Chosen
+)
+AREA_ERROR = 0.2  # standard deviation of an area, as a share. Measured: python -m benchmarks.force
 SADDLE_SHARE = (
     0.6  # of the smaller of two peaks, below which the pressure between them separates regions; chosen
 )
@@ -25,7 +31,7 @@ class Patch:
     Attributes:
         members: places in the support of its loads.
         area_mm2: touched area.
-        outline_mm: (P, 2) its outline.
+        outline_mm: (P, 2) its outline: of the places with the highest pressure, on that area.
     """
 
     members: NDArray[np.intp]
@@ -33,14 +39,33 @@ class Patch:
     outline_mm: Array
 
 
-def find_patches(gel: Gel, pressure_mpa: Array, support: NDArray[np.intp]) -> list[Patch]:
-    """The regions of the pressure (K,) at the loads; every load of the support belongs to one."""
+def touched_area(at_mm: Array, press_n: Array, spacing_mm: float) -> float:
+    """The touched area in mm^2, from the moments of forces (S,) at places (S, 2).
+
+    The pressure of a smooth object falls to zero at the rim, that of a flat one rises there. The family
+    (1 - r^2 / a^2)^m has both (Hertz: m = 1/2, uniform: 0, flat punch: -1/2, ring: -1): a^2 is m + 2 times the mean
+    square of r, and the mean of r^4 gives m. A contact of a few loads is taken as Hertz's.
+    """
+    centre = press_n @ at_mm / press_n.sum()
+    offset = at_mm - centre
+    # a single load is as wide as its spacing
+    least = np.eye(2) * (spacing_mm**2 / (4 * np.pi * HERTZ))
+    spread = (offset * press_n[:, None]).T @ offset / press_n.sum() + least * 2
+    squares = np.einsum("ni,ij,nj->n", offset, np.linalg.inv(spread), offset)
+    kurtosis = float(press_n @ squares**2 / press_n.sum()) / 4
+    factor, ellipse = HERTZ, 2 * np.pi * float(np.sqrt(np.linalg.det(spread)))
+    if HERTZ * ellipse > np.pi * (RESOLVED_SPACINGS * spacing_mm) ** 2:
+        factor = float(np.clip(kurtosis / max(2 - kurtosis, 1e-9), 1.0, HERTZ))
+    return factor * ellipse
+
+
+def find_patches(gel: Gel, pressure_mpa: Array, support: NDArray[np.intp], press_n: Array) -> list[Patch]:
+    """The regions of the pressure (K,) at the loads; every load of the support, of force (S,), belongs to one."""
     step = gel.spacing_mm
     low = gel.loads_mm.min(axis=0)
     cell = np.round((gel.loads_mm - low) / step).astype(np.intp) + 1
     field = np.zeros(cell.max(axis=0)[::-1] + 2)
     field[cell[:, 1], cell[:, 0]] = pressure_mpa
-    mine = field[cell[support, 1], cell[support, 0]]
     labels = _labels(field)
     at = labels[cell[support, 1], cell[support, 0]]
     found = []
@@ -48,13 +73,14 @@ def find_patches(gel: Gel, pressure_mpa: Array, support: NDArray[np.intp]) -> li
     wide = cv2.resize(labels.astype(np.float64), None, fx=FINE, fy=FINE, interpolation=cv2.INTER_NEAREST)
     for label in np.unique(at):
         members = np.flatnonzero(at == label)
-        touched = ((fine > TOUCHED_SHARE * mine[members].max()) & (wide == label)).astype(np.uint8)
+        area = touched_area(gel.loads_mm[support[members]], press_n[members], step)
+        own = np.where(wide == label, fine, -np.inf)
+        count = int(np.clip(round(area / (step / FINE) ** 2), 1, own.size - 1))
+        touched = (own >= np.partition(own.ravel(), -count)[-count]).astype(np.uint8)
         outlines, _ = cv2.findContours(touched, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         outline = max(outlines, key=cv2.contourArea)[:, 0].astype(np.float64)
         outline = ((outline + 0.5) / FINE - 0.5 - 1.0) * step + low
-        found.append(
-            Patch(members, max(float(touched.sum()), 1.0) * (step / FINE) ** 2, _counter_clockwise(outline))
-        )
+        found.append(Patch(members, area, _counter_clockwise(outline)))
     return found
 
 

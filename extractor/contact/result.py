@@ -42,7 +42,7 @@ class Region:
     """One contact, in the layout frame.
 
     Attributes:
-        area_mm2: area where the pressure is above a quarter of the region's largest.
+        area_mm2, area_sigma_mm2: touched area, and its deviation. Too large where a part is narrower than two loads.
         outline_mm: (P, 2) float64, the closed outline of this area, counter-clockwise.
         centre_mm: (2,) centre of pressure.
         centre_cov_mm2: (2, 2).
@@ -51,6 +51,7 @@ class Region:
     """
 
     area_mm2: float
+    area_sigma_mm2: float
     outline_mm: Array = field(repr=False)
     centre_mm: Array
     centre_cov_mm2: Array = field(repr=False)

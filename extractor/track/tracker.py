@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor.contact import ContactForce
 from extractor.errors import ImageError
 from extractor.image.input import Channels
 from extractor.image.pyramid import Pyramid, PyramidLevel
@@ -67,6 +68,7 @@ class Tracked:
         displacement_px: (M, 2) float64 from the rest frame in the image frame (x right, y down), NaN where unknown.
         displacement_mm: (M, 2) float64 in the layout frame (y up), NaN where unknown; see ``Rest``.
         elapsed_ms: time from image to markers.
+        contact: force, torque and regions, of a ``ContactTracker``; else None.
     """
 
     index: int
@@ -78,6 +80,7 @@ class Tracked:
     displacement_px: NDArray[np.float64]
     displacement_mm: NDArray[np.float64]
     elapsed_ms: float
+    contact: ContactForce | None = None
 
     def __repr__(self) -> str:
         reason = f"; {self.reason}" if self.reason else ""

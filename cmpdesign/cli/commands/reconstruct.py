@@ -10,12 +10,18 @@ import typer
 from cmpdesign.api import sequences
 from cmpdesign.cli.derived import derived
 from cmpdesign.cli.options.images import LayoutArgument
-from cmpdesign.cli.run_progress import RecoverOption, frames_text, recover_and_report, run_and_report
+from cmpdesign.cli.run_progress import (
+    RecoverOption,
+    contact_text,
+    frames_text,
+    recover_and_report,
+    run_and_report,
+)
 from cmpdesign.cli.terminal import say_table
 from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.runs import ContactPart, PositionsPart, ReconstructDocument
+    from cmpdesign.documents.runs import PositionsPart, ReconstructDocument
 
 EXAMPLES = (
     "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
@@ -73,17 +79,6 @@ def _describe_positions(positions: PositionsPart) -> str:
     return f"of the pattern, {depth_mm:g} mm below the touched surface; not of the touched surface"
 
 
-def _describe_contact(contact: ContactPart) -> str:
-    reasons = contact.reasons.items()
-    text = ", ".join(f"{count} x {reason.replace('_', ' ')}" for reason, count in reasons)
-    press = contact.largest
-    if press is None:
-        return text
-    pairs = zip(press.force_n, press.force_sigma_n, strict=True)
-    force = ", ".join(f"{value:.3f} ± {sigma:.3f}" for value, sigma in pairs)
-    return f"{text}; largest ({force}) N in frame {press.frame}"
-
-
 def _print_summary(done: ReconstructDocument) -> None:
     rows = {
         "frames": frames_text(done.frames),
@@ -112,6 +107,6 @@ def _print_summary(done: ReconstructDocument) -> None:
             f"{largest.mm:.4f} mm, marker {largest.marker} in frame {largest.frame}"
         )
     if done.contact is not None:
-        rows["contact"] = _describe_contact(done.contact)
+        rows["contact"] = contact_text(done.contact)
     rows["time a frame"] = ", ".join(f"{name} {value:.1f} ms" for name, value in done.time_ms.items())
     say_table(rows)

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 from cmpdesign.api import sequences
 from cmpdesign.cli.derived import derived
 from cmpdesign.cli.options.images import LayoutArgument, SourcesArgument
-from cmpdesign.cli.run_progress import RecoverOption, frames_text, recover_and_report, run_and_report
+from cmpdesign.cli.run_progress import (
+    RecoverOption,
+    contact_text,
+    frames_text,
+    recover_and_report,
+    run_and_report,
+)
 from cmpdesign.cli.terminal import print_warning, printable_path, say_table
 from cmpdesign.tracking.jobs.options import SequenceOptions, TrackOptions
 
@@ -60,6 +66,8 @@ def _print_summary(done: TrackDocument) -> None:
         rows["image quality"] = quality_text(done.quality.model_dump())
         if done.quality.hints:
             rows["remedy"] = "; ".join(done.quality.hints)
+    if done.contact is not None:
+        rows["contact"] = contact_text(done.contact)
     if largest is not None:
         mm = "" if largest.mm is None else f" = {largest.mm:.4g} mm"
         rows["largest displacement"] = (

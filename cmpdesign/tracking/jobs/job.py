@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
     from cmpdesign.contact.elastomer import Elastomer
     from cmpdesign.tracking.run import TrackingRun
-    from extractor import Reference
+    from extractor import ContactTracker, Markers, Reference, Tracker
     from extractor.contact import ContactReader
 
 Summary = TypeVar("Summary", bound=Document, covariant=True)
@@ -110,13 +110,20 @@ class TrackJob:
         at_rest, rest = None, how["rest"]
         if rest is not None:
             at_rest = read_rest_markers(str(rest), source, how["fps"], new_tracker(), how["max_pixels"])
-        tracker = new_tracker(rest=at_rest, mm_per_px=how["mm_per_px"])
+        plain = new_tracker(rest=at_rest, mm_per_px=how["mm_per_px"])
+        tracker: Tracker | ContactTracker = plain
+        contact, gel, rig = None, _path(how["contact"]), _path(how["rig"])
+        if (gel is None) != (rig is None):
+            raise CmpDesignError(f"{parameter('contact')} and {parameter('rig')} need each other; give both")
+        if gel is not None and rig is not None:
+            contact = _contact_reader(gel, rig, self.layout)
+            tracker = _contact_tracker(plain, rig, contact, at_rest)
         frames = open_source(source, how["fps"], how["max_pixels"], how["times"])
         video = None
         if self.overlay is not None:
             video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
         outputs = open_outputs(
-            self.output, TrackTable(tracker, lambda: frames.times), recording_of(how), viewer
+            self.output, TrackTable(tracker, lambda: frames.times, contact), recording_of(how), viewer
         )
         statistics = TrackStatistics(self.layout)
         return TrackingRun(frames, tracker, outputs.sink, statistics, video, how["frames"], live=outputs.live)
@@ -314,6 +321,21 @@ def _contact_reader(gel: Path, rig: Path, layout: Reference) -> ContactReader:
         young_sigma_mpa=scale.young_sigma_mpa,
         friction=scale.friction,
     )
+
+
+def _contact_tracker(
+    tracker: Tracker, rig: Path, contact: ContactReader, rest: Markers | None
+) -> ContactTracker:
+    """A tracker of the rig's only view that also reads forces."""
+    from extractor import ContactTracker, load_rig
+
+    views = load_rig(rig).views
+    if len(views) != 1 or views[0].area_px is not None:
+        raise CmpDesignError(
+            f"{rig} has {len(views)} views; force from one camera needs one [[view]] of the whole image: take "
+            "reconstruct for several views"
+        )
+    return ContactTracker(tracker, views[0], contact, rest)
 
 
 def _path(given: str | Path | None) -> Path | None:

@@ -56,12 +56,16 @@ class TrackOptions(SequenceOptions, total=False):
         mm_per_px: scale for mm along the image's axes; None: mm in the layout's frame.
         overlay: video of the found markers: .mp4, .avi or .mkv.
         quiver: arrows of the frame with the largest displacement: .png.
+        contact: also write force, torque and traction, by this file of calibrate gel; needs rig.
+        rig: file with the camera's view and the [elastomer], for contact.
     """
 
     rest: Annotated[str | Path | int | None, Usual(None, metavar="N|IMAGE")]
     mm_per_px: Annotated[float | None, Usual(None, metavar="SCALE", above=0)]
     overlay: Annotated[str | Path | None, Usual(None, metavar="VIDEO")]
     quiver: Annotated[str | Path | None, Usual(None, metavar="PNG")]
+    contact: Annotated[str | Path | None, Usual(None, metavar="GEL")]
+    rig: Annotated[str | Path | None, Usual(None, metavar="RIG")]
 
 
 class ShapeOptions(SequenceOptions, total=False):

@@ -16,6 +16,7 @@ from tests.support.tracking.files import loaded
 from tests.support.tracking.foxglove_client import free_port, received_while
 from tests.support.tracking.messages import points_of, read_messages
 from tests.support.tracking.press import write_press
+from tests.support.view_scenes import binocular, rig_of
 
 pytestmark = pytest.mark.slow  # the block of a pad of 8 layers
 ELASTOMER = "[elastomer]\nthickness_mm = 4\npoisson = 0.5\nmarker_depth_mm = 0.5\n"
@@ -114,6 +115,22 @@ def test_exports_take_the_forces_over(made: Path, tmp_path: Path) -> None:
     assert run(*words, "-o", tmp_path / "b.npz").exit_code == 0
     both = (tmp_path / "a.npz", tmp_path / "b.npz")
     assert "the contact is without" in refused("export", "zarr", *both, "-o", tmp_path / "c.zarr")
+
+
+def test_one_camera_gives_about_the_force_of_two(made: Path, tmp_path: Path) -> None:
+    view = rig_of(binocular()).views[0]
+    text = f'[[view]]\nname = "left"\nfocal_px = {list(view.focal_px)}\ncentre_px = {list(view.centre_px)}\n'
+    (tmp_path / "one.toml").write_text(f"{text}{ELASTOMER}young_mpa = 0.3\n", encoding="utf-8")
+    words = ("track", made / "layout.json", made / "left", "--contact", made / "gel.npz")
+    outputs = ("-o", tmp_path / "a.npz", "--overlay", tmp_path / "a.avi")
+    assert run(*words, "--rig", tmp_path / "one.toml", *outputs).exit_code == 0
+    assert run(*reconstruct(made, tmp_path / "b.npz")).exit_code == 0
+    one, two = loaded(tmp_path / "a.npz"), loaded(tmp_path / "b.npz")
+    assert (one["force_n"][0] == 0).all()
+    assert one["force_n"][3, 2] == pytest.approx(two["force_n"][3, 2], rel=0.2)
+    assert "need each other" in refused(*words, "-o", tmp_path / "c.npz")
+    several = refused(*words, "--rig", made / "sensor.toml", "-o", tmp_path / "c.npz")
+    assert "reconstruct for several views" in several
 
 
 def test_weights_give_a_modulus_and_bad_files_one_line(made: Path, tmp_path: Path) -> None:

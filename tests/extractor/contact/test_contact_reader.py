@@ -21,6 +21,7 @@ from extractor import (
     Gel,
     GelError,
     Reference,
+    View,
     load_gel,
 )
 
@@ -28,6 +29,10 @@ Array = NDArray[np.float64]
 YOUNG_MPA = 0.3
 SIGMA_MM = np.array([0.001, 0.001, 0.003])
 LINEAR = ForceModel(strain_factor=0.0)
+EXACT = ForceModel(
+    strain_factor=0.0, strain_sigma=0.0, normal_error=0.0, shear_error=0.0, torque_error=0.0, shear_by_press=0.0,
+    centre_error_mm=0.0,
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +95,25 @@ def test_force_torque_and_utilisation_of_a_sheared_and_twisted_ball(
     np.testing.assert_allclose(sum(region.force_n for region in found.regions), found.force_n, atol=1e-9)
 
 
+def test_a_large_strain_needs_more_force(layout: Reference, gel: Gel) -> None:
+    """The strain factor grows with the square of force over area and modulus, region by region."""
+    press = Press(gel, (-3.0, 1.0, 2.0), (2.5, -1.0, 2.0))
+    linear = read(layout, gel, press.seen())
+    stiff = ContactReader(layout, gel, YOUNG_MPA, model=ForceModel(strain_factor=2.0)).read(
+        press.seen(), cov(layout)
+    )
+    for one, other in zip(linear.regions, stiff.regions, strict=True):
+        load = -one.force_n[2] / (one.area_mm2 * YOUNG_MPA)
+        assert other.force_n[2] == pytest.approx(one.force_n[2] * (1 + 2.0 * load**2), rel=1e-6)
+        assert other.force_cov_n2[2, 2] > one.force_cov_n2[2, 2]
+    beyond = 20 * Press(gel, (0.0, 0.0, 2.0)).moved
+    largest = (
+        ContactReader(layout, gel, YOUNG_MPA).read(beyond, cov(layout)).force_n[2]
+        / read(layout, gel, beyond).force_n[2]
+    )
+    assert 1.0 < largest < 1.2
+
+
 def test_regions_have_the_place_and_the_area_of_two_balls(layout: Reference, gel: Gel) -> None:
     press = Press(gel, (-3.0, 1.0, 2.0), (2.5, -1.0, 2.0))
     found = read(layout, gel, press.seen())
@@ -104,10 +128,9 @@ def test_regions_have_the_place_and_the_area_of_two_balls(layout: Reference, gel
 
 def test_stated_deviations_of_the_noise_are_true(layout: Reference, gel: Gel) -> None:
     # the loads are those of the model, so its own error is left out
-    model = ForceModel(normal_error=0.0, shear_error=0.0, torque_error=0.0, centre_error_mm=0.0)
     press = Press(gel, (0.5, 0.3, 2.4), shear=0.1)
     z = []
-    reader = ContactReader(layout, gel, YOUNG_MPA, model=model)
+    reader = ContactReader(layout, gel, YOUNG_MPA, model=EXACT)
     for seed in range(20):
         reader.reset()
         found = reader.read(press.seen(seed), cov(layout))
@@ -135,6 +158,29 @@ def test_a_tenth_of_the_markers_may_be_lost(layout: Reference, gel: Gel) -> None
     assert np.isfinite(found.force_cov_n2).all()
     assert len(found.regions) == 1
     np.testing.assert_allclose(found.force_n, press.force_n, atol=0.05 * np.linalg.norm(press.force_n))
+
+
+def test_one_view_gives_the_force_through_its_projection(layout: Reference, gel: Gel) -> None:
+    """A camera 60 mm below the pad, 14 px a mm."""
+    view = View(
+        "below",
+        (840.0, 840.0),
+        (320.0, 240.0),
+        R_camera_from_layout=np.eye(3),
+        t_camera_from_layout_mm=(0, 0, 60.0),
+    )
+    flat = np.pad(layout.xy_mm, [(0, 0), (0, 1)])
+    press = Press(gel, (0.5, -0.5, 2.5), shear=0.2)
+    random = np.random.default_rng(2)
+    moved_px = (
+        view.project(flat + press.moved) - view.project(flat) + 0.02 * random.normal(size=(len(flat), 2))
+    )
+    reader = ContactReader(layout, gel, YOUNG_MPA, model=LINEAR).seen(view.linearised(flat).by_point)
+    found = reader.read(moved_px, np.tile(0.02**2 * np.eye(2), (len(flat), 1, 1)))
+    np.testing.assert_allclose(found.force_n, press.force_n, atol=0.05 * np.linalg.norm(press.force_n))
+    assert len(found.regions) == 1
+    with pytest.raises(ValueError, match="2, 2"):
+        reader.read(press.moved, cov(layout))
 
 
 def test_a_warm_frame_finds_the_force_of_a_cold_one(layout: Reference, gel: Gel) -> None:
