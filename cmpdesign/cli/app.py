@@ -25,7 +25,7 @@ from cmpdesign.cli.commands import (
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
-from cmpdesign.cli.commands.pages import studio
+from cmpdesign.cli.commands.pages import studio, view
 from cmpdesign.cli.commands.starting import cameras, init, schema, templates
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
 from cmpdesign.errors import OutputError
@@ -46,6 +46,7 @@ for module, function in (
     (init, init.init),
     (size, size.size),
     (studio, studio.studio),
+    (view, view.view),
     (build, build.build),
     (check, check.check),
     (render, render.render),

@@ -111,7 +111,7 @@ class TemplateDocument(Document):
 
 
 class StudioDocument(Document):
-    """The page that ``studio`` serves; printed when the page can be opened."""
+    """The page that ``studio`` or ``view`` serves; printed when the page can be opened."""
 
     format: Literal["cmp-studio"] = "cmp-studio"
     version: Literal[1] = 1

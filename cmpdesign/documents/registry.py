@@ -20,6 +20,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "init": (designs.InitDocument,),
     "size": (designs.SizeDocument,),
     "studio": (designs.StudioDocument,),
+    "view": (designs.StudioDocument,),
     "build": (designs.BuildDocument,),
     "check": (designs.CheckDocument,),
     "render": (runs.RenderDocument,),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,17 @@ from cmpdesign.studio import designs, pictures
 from cmpdesign.studio.builds import Builds
 from cmpdesign.studio.designs import Look
 from cmpdesign.studio.guard import Door, Guard
+from cmpdesign.studio.live import CameraReader, LiveFeed, frame_document, hello_document, shown_image
 from cmpdesign.studio.readings import MOST_PICTURE_BYTES, Readings
+from extractor import ExtractorError
 
 with extra("studio"):
     from starlette.applications import Starlette
     from starlette.concurrency import run_in_threadpool
     from starlette.requests import Request
     from starlette.responses import JSONResponse, Response
-    from starlette.routing import Route
+    from starlette.routing import Route, WebSocketRoute
+    from starlette.websockets import WebSocket, WebSocketDisconnect
 
 MOST_TEXT_BYTES = 1 << 20
 PAGE = Path(__file__).parent / "page"
@@ -49,16 +52,17 @@ class _Refused(Exception):
 class Studio:
     """The state of one run of the page."""
 
+    live: LiveFeed | None = None
     builds: Builds = field(default_factory=Builds)
     readings: Readings = field(default_factory=Readings)
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[Route | WebSocketRoute]:
         """The addresses."""
         get, post = ["GET"], ["POST"]
         return [
             Route("/", _page_file, methods=get),
             Route("/page/{name}", _page_file, methods=get),
-            Route("/api/start", _start, methods=get),
+            Route("/api/start", self._start, methods=get),
             Route("/api/templates/{name}.svg", _template, methods=get),
             Route("/api/design", _design, methods=post),
             Route("/api/remedy", _remedy, methods=post),
@@ -73,7 +77,38 @@ class Studio:
             Route("/api/readings", self._read, methods=post),
             Route("/api/readings/{key}/report.zip", self._report, methods=get),
             Route("/api/readings/{key}/{stage}.jpg", self._picture, methods=get),
+            WebSocketRoute("/live/source", self._live),
+            WebSocketRoute("/live/camera", _camera),
         ]
+
+    async def _start(self, request: Request) -> Response:
+        document = await run_in_threadpool(designs.start_document)
+        source = None if self.live is None else self.live.name
+        return JSONResponse({"version": __version__, "live": source, **document})
+
+    async def _live(self, socket: WebSocket) -> None:
+        """The latest frame of the run, each time that the page asks for one."""
+        feed = self.live
+        await socket.accept()
+        if feed is None:
+            await socket.close(reason="there is no live source; start with: cmpdesign view LAYOUT SOURCE")
+            return
+        count = -1
+        with suppress(WebSocketDisconnect):
+            await socket.send_json(hello_document(feed.layout, feed.name))
+            while True:
+                if await socket.receive_text() == "rest":
+                    feed.reset_rest()
+                    continue
+                latest = None
+                while latest is None and not (feed.is_over and count >= 0):
+                    latest = await run_in_threadpool(feed.newer, count)
+                if latest is None:
+                    await socket.send_json({"over": feed.failure or "the source has ended"})
+                    return
+                count = latest.count
+                await socket.send_json(frame_document(latest.frame, latest.frames_per_s))
+                await socket.send_bytes(await run_in_threadpool(shown_image, latest.image))
 
     async def _build(self, request: Request) -> Response:
         asked = await _asked(request)
@@ -121,21 +156,19 @@ class Studio:
         return _download(await run_in_threadpool(reading.report), "report.zip")
 
 
-def make_app(door: Door, live: Any = None) -> Any:
-    """The ASGI application behind its guard.
+def make_app(door: Door, live: LiveFeed | None = None) -> Any:
+    """The ASGI application behind its guard; ``live``: the run of the live part.
 
     Raises:
         MissingLibraryError: the extra is not installed.
     """
-    studio = Studio()
+    studio = Studio(live)
 
     @asynccontextmanager
     async def lifespan(app: Any) -> AsyncIterator[None]:
         yield
         studio.builds.close()
         studio.readings.close()
-
-    from extractor import ExtractorError
 
     app = Starlette(
         routes=studio.routes(),
@@ -158,10 +191,6 @@ async def _page_file(request: Request) -> Response:
     return Response(
         await run_in_threadpool(read_file, path), media_type=_KINDS.get(path.suffix, "text/plain")
     )
-
-
-async def _start(request: Request) -> Response:
-    return JSONResponse({"version": __version__, **await run_in_threadpool(designs.start_document)})
 
 
 async def _template(request: Request) -> Response:
@@ -214,6 +243,28 @@ async def _seen(request: Request) -> Response:
 async def _laser(request: Request) -> Response:
     asked = await _asked(request)
     return JSONResponse(await run_in_threadpool(pictures.laser_document, asked.get("fields")))
+
+
+async def _camera(socket: WebSocket) -> None:
+    """Frames of the browser's camera, read with the layout of a design; one frame is under way."""
+    await socket.accept()
+    with suppress(WebSocketDisconnect):
+        try:
+            fields = parse_json(socket.query_params.get("fields", "{}"), "the design")
+            layout = designs.design_of(fields).layout.reference()
+            reader = await run_in_threadpool(CameraReader, layout)
+        except (CmpDesignError, ExtractorError) as error:
+            await socket.send_json({"over": str(error)})
+            return
+        await socket.send_json(hello_document(layout, "the camera of this browser"))
+        while True:
+            message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            if message.get("bytes") is None:
+                reader.reset_rest()
+            else:
+                await socket.send_json(await run_in_threadpool(reader.read, message["bytes"]))
 
 
 async def _asked(request: Request) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -67,12 +67,18 @@ def start_document() -> dict[str, Any]:
     for dotted, kind in LIBRARIES.items():
         table, field = dotted.split(".")
         model = schema["properties"][table]["$ref"].rpartition("/")[2]
-        schema["$defs"][model]["properties"][field]["enum"] = list(template_kinds()[kind])
+        schema["$defs"][model]["properties"][field]["enum"] = list(library_names(kind))
     words = {name: template_words(path) for name, path in templates().items()}
     shown = [
         {"name": name, **of._asdict(), "fields": fields_of(load_design(name))} for name, of in words.items()
     ]
     return {"schema": schema, "templates": shown}
+
+
+@cache
+def library_names(kind: str) -> tuple[str, ...]:
+    """The names of the templates of a kind; the files do not change while the page runs."""
+    return tuple(template_kinds()[kind])
 
 
 def fields_of(design: Any) -> dict[str, Any]:
@@ -93,7 +99,7 @@ def design_of(fields: object) -> Design:
         table, field = dotted.split(".")
         inner = fields.get(table)
         name = inner.get(field) if isinstance(inner, Mapping) else None
-        known = template_kinds()[kind]
+        known = library_names(kind)
         if name is not None and name not in known:
             raise DesignError(
                 f"{dotted} = {str(name)[:60]!r}: the page takes names of templates only: {', '.join(known)}; "

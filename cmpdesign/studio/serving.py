@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import secrets
+import signal
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from threading import Timer
-from typing import Any
+from typing import TYPE_CHECKING
 
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.libraries import extra, require_libraries
 from cmpdesign.studio.guard import Door
+
+if TYPE_CHECKING:
+    from cmpdesign.studio.live import LiveFeed
 
 HOST, PORT = "127.0.0.1", 8300
 MOST_MESSAGE_BYTES = 8 << 20  # of a websocket: one frame of a camera
@@ -23,7 +28,7 @@ def serve(
     announce: Callable[[str], None],
     *,
     with_browser: bool = True,
-    live: Any = None,
+    live: LiveFeed | None = None,
 ) -> None:
     """Serve the page until Ctrl-C.
 
@@ -32,7 +37,7 @@ def serve(
         port: port; 0: any free port.
         announce: called with the page's address, with its token, once requests are accepted.
         with_browser: also open the address in the browser.
-        live: the source of the live part, if any.
+        live: the run of the live part, if any.
 
     Raises:
         MissingLibraryError: the extra is not installed.
@@ -57,10 +62,23 @@ def serve(
     if with_browser:
         import webbrowser
 
-        timer = Timer(BROWSER_S, webbrowser.open, [door.address + ("#/live" if live is not None else "")])
+        timer = Timer(BROWSER_S, webbrowser.open, [door.address + ("#/touch" if live is not None else "")])
         timer.daemon = True
         timer.start()
-    uvicorn.Server(config).run(sockets=[listening])
+
+    class Server(uvicorn.Server):
+        """Ends at the first Ctrl-C and returns; uvicorn's own server raises the signal again, past all clean-up."""
+
+        @contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            earlier = {one: signal.signal(one, self.handle_exit) for one in (signal.SIGINT, signal.SIGTERM)}
+            try:
+                yield
+            finally:
+                for one, handler in earlier.items():
+                    signal.signal(one, handler)
+
+    Server(config).run(sockets=[listening])
 
 
 def _listen(host: str, port: int) -> socket.socket:

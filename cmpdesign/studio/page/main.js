@@ -6,8 +6,9 @@ import { MakePart } from "./make.js";
 import { ReadPart } from "./read.js";
 import { StartPart } from "./start.js";
 import { design } from "./state.js";
+import { TouchPart } from "./touch.js";
 
-const PARTS = { start: ["Start", StartPart], design: ["Design", DesignPart], make: ["Make", MakePart], read: ["Read", ReadPart] };
+const PARTS = { start: ["Start", StartPart], design: ["Design", DesignPart], make: ["Make", MakePart], read: ["Read", ReadPart], touch: ["Touch", TouchPart] };
 const content = document.getElementById("content"), tabs = document.getElementById("tabs"), made = {};
 const undo = document.getElementById("undo"), redo = document.getElementById("redo");
 

@@ -36,7 +36,7 @@ CALLS = {
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
 }
-NOT_CALLS = {"init", "studio"}  # of files for editors; of a page
+NOT_CALLS = {"init", "studio", "view"}  # of files for editors; of a page
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 import pytest
 
 import cmpdesign
@@ -189,6 +190,64 @@ def test_good_and_bad_pictures(page: Any, tmp_path: Path) -> None:
     page.set_input_files("#picture", tmp_path / "other.png")
     page.wait_for_selector(".finding.error:has-text('Not verified')")
     assert page.locator(".stages button").count() > 3
+
+
+def test_200_frames_of_a_camera_against_the_truth(address: str, tmp_path: Path) -> None:
+    """Chromium's camera is a file of rendered frames; the page's markers are compared with the frames' truth."""
+    layout = cmpdesign.load("tac3d").layout
+    rendered = [cmpdesign.render(layout, pitch_px=18, press_mm=0.1 * k, noise=1, seed=k) for k in range(6)]
+    jpegs = [cv2.imencode(".jpg", one.image, [cv2.IMWRITE_JPEG_QUALITY, 98])[1].tobytes() for one in rendered]
+    (tmp_path / "camera.mjpeg").write_bytes(b"".join(jpegs))
+    truth = np.stack([one.truth.marker_xy_px for one in rendered])
+    flags = (
+        "--use-fake-device-for-media-stream",
+        f"--use-file-for-fake-video-capture={tmp_path}/camera.mjpeg",
+    )
+    frames: list[dict[str, Any]] = []
+    with browser(*flags) as chrome:
+        page = chrome.new_page()
+        page.on(
+            "websocket",
+            lambda socket: socket.on("framereceived", lambda text: frames.append(json.loads(text))),
+        )
+        page.goto(address)
+        open_template(page, "tac3d")
+        page.click("nav >> text=Touch")
+        page.click("text=Use the camera of this browser")
+        while len(frames) < 201:
+            page.wait_for_timeout(200)
+        assert re.search(r"frame \d+", page.inner_text(".note"))
+    errors = []
+    for frame in frames[1:201]:  # the first is the pad
+        assert frame["tracked"] and frame["measured"] > 320, frame["reason"]
+        distance = np.linalg.norm(np.array(frame["place"]) - truth[:, frame["ids"]], axis=2)
+        errors.append(distance[distance.mean(axis=1).argmin()])
+    assert np.concatenate(errors).max() < 2.0  # no marker under another's id; a JPEG of a JPEG
+    assert np.sqrt(np.mean(np.concatenate(errors) ** 2)) < 0.3
+
+
+def test_a_camera_without_a_right_and_a_source_of_view(chrome: Any, address: str, tmp_path: Path) -> None:
+    page = chrome.new_page()
+    page.goto(address)
+    page.wait_for_selector(".card")
+    page.click("nav >> text=Touch")
+    page.click("text=Use the camera of this browser")
+    page.wait_for_selector(".note:has-text('no camera that the browser can use')")
+    page.close()
+    design = cmpdesign.load("honeycomb", layers=5)
+    design.layout.write(tmp_path / "layout.json")
+    for k in range(8):
+        cv2.imwrite(
+            f"{tmp_path}/{k}.png", cmpdesign.render(design.layout, press_mm=0.1 * k, noise=1, seed=k).image
+        )
+    with served("view", f"{tmp_path}/layout.json", f"{tmp_path}", "-o", f"{tmp_path}/run.npz") as live:
+        page = chrome.new_page()
+        page.goto(f"{live}#/touch")
+        page.wait_for_selector(".note:has-text('the source has ended')")
+        assert "91 of 91" in page.inner_text("aside")
+        page.close()
+    assert len(cmpdesign.load_run(tmp_path / "run.npz").arrays["displacement_mm"]) == 8
+    assert (tmp_path / "run.npz.summary.json").exists()
 
 
 @pytest.mark.parametrize(("width", "theme"), [(360, "dark"), (1280, "light"), (3840, "dark")])

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import socket
 import zipfile
 import zlib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
 
 import cmpdesign
+from cmpdesign.api.sequences import track_job
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import to_png
 from cmpdesign.products.drawing.svg import layout_to_svg
 from cmpdesign.studio.app import PAGE, make_app
 from cmpdesign.studio.guard import Door
+from cmpdesign.studio.live import LiveFeed
 from cmpdesign.studio.serving import serve
 
 DOOR = Door("127.0.0.1", 8300, "the-token-of-this-run")
-HOME = "http://127.0.0.1:8300"
+HOME, SOCKETS = "http://127.0.0.1:8300", "ws://127.0.0.1:8300"
 FIELDS = {"pattern": "honeycomb", "layers": 3, "pitch_mm": "60mil"}
 
 
@@ -190,3 +196,60 @@ def test_a_picture_is_read_as_the_call_reads_it(page: TestClient) -> None:
     bomb[16:24] = (9_000).to_bytes(4, "big") * 2
     bomb[29:33] = zlib.crc32(bomb[12:29]).to_bytes(4, "big")
     assert "megapixels; the limit is 60" in refused(page, "/api/readings", params=query, content=bytes(bomb))
+
+
+# -- live
+
+
+def test_frames_of_the_browsers_camera_are_tracked(page: TestClient) -> None:
+    """One frame after the other; displacements count from the frame at rest, until another frame is the rest."""
+    design = cmpdesign.Design(**FIELDS)
+    frames = [
+        cmpdesign.render(design.layout, pitch_px=30, press_mm=press, noise=1, seed=1) for press in (0, 0.4)
+    ]
+    moved = frames[1].truth.marker_xy_px - frames[0].truth.marker_xy_px
+    address = f"{SOCKETS}/live/camera?fields={json.dumps(FIELDS)}"
+    with page.websocket_connect(address, headers={"origin": HOME}) as socket:
+        assert socket.receive_json()["markers"] == 37
+        for number, frame in enumerate(frames):
+            socket.send_bytes(to_png(frame.image))
+            found = socket.receive_json()
+            assert found["measured"] == 37 and found["tracked"]
+            assert np.abs(found["place"] - frame.truth.marker_xy_px[found["ids"]]).max() < 0.3
+            assert np.abs(found["moved"] - number * moved[found["ids"]]).max() < 0.3
+        socket.send_text("rest")
+        socket.send_bytes(to_png(frames[1].image))
+        assert np.abs(socket.receive_json()["moved"]).max() < 0.3
+        socket.send_bytes(b"no picture")
+        lost = socket.receive_json()
+        assert not lost["tracked"] and "is not an image" in lost["reason"] and lost["ids"] == []
+
+
+@pytest.mark.parametrize("headers", [{}, {"origin": "http://rebound.example"}, {"origin": "null"}])
+def test_a_foreign_websocket_is_refused(page: TestClient, headers: dict[str, str]) -> None:
+    with (
+        pytest.raises(WebSocketDisconnect),
+        page.websocket_connect(f"{SOCKETS}/live/camera", headers=headers),
+    ):
+        pytest.fail("the connection is open")
+
+
+def test_a_run_is_shown_and_recorded(tmp_path: Path) -> None:
+    design = cmpdesign.Design(**FIELDS)
+    for number in range(4):
+        image = cmpdesign.render(design.layout, pitch_px=30, noise=1, seed=number).image
+        (tmp_path / f"{number}.png").write_bytes(to_png(image))
+    job = track_job(design.layout, tmp_path, tmp_path / "run.npz")
+    run = job.prepare()
+    feed = LiveFeed("frames", job.layout, is_paced=True)
+    feed.follow(run).join(60)
+    assert len(cmpdesign.load_run(tmp_path / "run.npz").arrays["displacement_mm"]) == 4
+    with TestClient(make_app(DOOR, feed), base_url=HOME) as client:
+        client.get(DOOR.address.removeprefix(HOME))
+        with client.websocket_connect(f"{SOCKETS}/live/source", headers={"origin": HOME}) as socket:
+            assert socket.receive_json()["name"] == "frames"
+            socket.send_text("next")
+            assert (shown := socket.receive_json())["index"] == 3 and shown["measured"] == 37
+            assert socket.receive_bytes().startswith(b"\xff\xd8")
+            socket.send_text("next")
+            assert socket.receive_json() == {"over": "the source has ended"}

@@ -1,0 +1,1 @@
+"""The times of the studio's page: ``python -m benchmarks.studio``."""

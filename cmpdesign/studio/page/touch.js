@@ -1,0 +1,148 @@
+// The part "Touch": a camera of this browser, or the source of "cmpdesign view", live: markers and arrows of one view,
+// the surface and forces of several. One frame is under way; the next is asked for when it has been drawn.
+
+import { figures, h, number } from "./base.js";
+import { design } from "./state.js";
+import { Surface } from "./surface.js";
+
+const PLOT_FRAMES = 300, STATUS_COLORS = ["", "#ffe94a", "#ff9d2e", "#ff8cff"], AXIS_COLORS = ["#e5484d", "#30a46c", "#4a7dff"];
+const CAMERA_WORDS = { NotAllowedError: "The browser has no right to the camera: allow it in the address bar.", NotFoundError: "This machine has no camera that the browser can use.", NotReadableError: "Another program uses the camera; close it." };
+
+export class TouchPart {
+  constructor(start) {
+    this.canvas = h("canvas", { role: "img", "aria-label": "The frame with its markers and displacements" });
+    this.words = h("p", { class: "note" }, "No source yet.");
+    this.video = h("video", { muted: true, playsinline: true, hidden: true });
+    this.health = h("div", { class: "box" });
+    this.plot = h("canvas", { class: "plot", role: "img", "aria-label": "Running plot" });
+    this.plotWords = h("p", { class: "small soft" });
+    this.factor = h("input", { type: "range", min: 1, max: 30, step: 1, value: 5, id: "factor", oninput: () => this.#draw() });
+    this.space = h("div", { class: "canvas" }, this.canvas);
+    const button = (text, act, kind = "") => h("button", { class: kind, onclick: act }, text);
+    this.element = h("div", { class: "work two" }, h("aside", { class: "side", "aria-label": "Source and health" },
+      h("div", { class: "box" }, h("h2", {}, "Source"), start.live && button(`Show ${start.live}`, () => this.#openSource(), "primary"), button("Use the camera of this browser", () => this.#openCamera(), start.live ? "" : "primary"),
+        h("div", { class: "row" }, button("This is rest", () => this.socket?.send("rest")), button("Stop", () => this.#stop("Stopped."))), h("p", { class: "soft small" }, "The camera is read with the layout of the present design. Another source: cmpdesign view LAYOUT SOURCE.")),
+      h("div", { class: "box" }, h("label", { for: "factor" }, "Arrows and heights, enlarged"), this.factor), h("div", { class: "box" }, h("h2", {}, "Running"), this.plot, this.plotWords), this.health), h("section", { class: "stage", "aria-label": "Live" }, this.space, this.words), this.video);
+    this.isWanted = Boolean(start.live);
+    new ResizeObserver(() => this.#draw()).observe(this.space);
+  }
+
+  refresh() { if (this.isWanted && !this.socket) { this.isWanted = false; this.#openSource(); } }
+
+  #connect(path, onframe) {
+    this.#stop("Connecting.");
+    this.history = [];
+    const socket = new WebSocket(`ws://${location.host}${path}`);
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = async ({ data }) => {
+      if (socket !== this.socket) return;
+      if (typeof data !== "string") { await onframe(data); return; }
+      const told = JSON.parse(data);
+      if (told.over !== undefined) { this.#stop(told.over); return; }
+      if (told.cells) { this.pad = told; this.words.textContent = told.name; await onframe(null); return; }
+      this.frame = told;
+      await onframe(told);
+    };
+    socket.onclose = ({ reason }) => { if (socket === this.socket) this.#stop(reason || "The connection has ended."); };
+    this.socket = socket;
+  }
+
+  // A frame is a document and then its image.
+  #openSource() {
+    this.#connect("/live/source", async (data) => {
+      if (data instanceof ArrayBuffer) {
+        this.image = data.byteLength ? await createImageBitmap(new Blob([data], { type: "image/jpeg" })) : null;
+        this.#draw();
+        this.#tell();
+      }
+      if (data === null || data instanceof ArrayBuffer) requestAnimationFrame(() => this.socket?.readyState === 1 && this.socket.send("next"));
+    });
+  }
+
+  async #openCamera() {
+    if (!navigator.mediaDevices) { this.#stop("This browser gives no camera to this page."); return; }
+    let stream;
+    try { stream = await navigator.mediaDevices.getUserMedia({ video: { width: { ideal: 1280 } } }); } catch (error) { this.#stop(CAMERA_WORDS[error.name] ?? error.message); return; }
+    const grab = new OffscreenCanvas(1, 1), send = async () => {
+      grab.width = this.video.videoWidth;
+      grab.height = this.video.videoHeight;
+      grab.getContext("2d").drawImage(this.video, 0, 0);
+      const [picture, blob] = await Promise.all([createImageBitmap(grab), grab.convertToBlob({ type: "image/jpeg", quality: 0.95 })]);
+      this.next = picture;
+      if (this.socket?.readyState === 1) this.socket.send(await blob.arrayBuffer());
+    };
+    this.#connect(`/live/camera?${new URLSearchParams({ fields: JSON.stringify(design.fields) })}`, async (told) => {
+      if (told) { this.image = this.next; this.#draw(); this.#tell(); }
+      this.video.requestVideoFrameCallback(send);
+    });
+    this.stream = stream;
+    this.video.srcObject = stream;
+    await this.video.play();
+  }
+
+  #stop(text) {
+    const socket = this.socket;
+    this.socket = null;
+    socket?.close();
+    for (const track of this.stream?.getTracks() ?? []) track.stop();
+    this.stream = null;
+    this.words.textContent = text;
+  }
+
+  #draw() {
+    const frame = this.frame, { clientWidth: width, clientHeight: height } = this.space;
+    if (!frame || !width || !height) return;
+    if (frame.in_space) {
+      this.surface ??= new Surface();
+      if (this.surface.canvas.parentElement !== this.space) this.space.replaceChildren(this.surface.canvas);
+      this.surface.show(this.pad, frame, Number(this.factor.value), width, height);
+      return;
+    }
+    const ratio = devicePixelRatio, context = this.canvas.getContext("2d"), image = this.image;
+    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) Object.assign(this.canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
+    const size = image ? [image.width, image.height] : [640, 480], scale = Math.min(width / size[0], height / size[1]) * ratio;
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    context.setTransform(scale, 0, 0, scale, (this.canvas.width - scale * size[0]) / 2, (this.canvas.height - scale * size[1]) / 2);
+    if (image) context.drawImage(image, 0, 0);
+    context.translate(0.5, 0.5); // the centre of the top-left pixel is (0, 0)
+    const factor = Number(this.factor.value), radius = (2.2 * ratio) / scale;
+    context.lineWidth = (1.6 * ratio) / scale;
+    context.strokeStyle = "#54f0ff";
+    context.beginPath();
+    frame.place.forEach(([x, y], at) => { const [dx, dy] = frame.moved[at]; context.moveTo(x, y); context.lineTo(x + factor * dx, y + factor * dy); });
+    context.stroke();
+    frame.place.forEach(([x, y], at) => { context.fillStyle = STATUS_COLORS[frame.status[at]]; context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius); });
+  }
+
+  #tell() {
+    const frame = this.frame, force = frame.contact?.known ? frame.contact : null, now = performance.now();
+    this.shownTimes = [...(this.shownTimes ?? []).slice(-29), now];
+    const shown = (1000 * (this.shownTimes.length - 1)) / (now - this.shownTimes[0] || 1);
+    this.history.push(force ? force.force_n : [frame.largest_mm ?? NaN]);
+    this.history.splice(0, this.history.length - PLOT_FRAMES);
+    const withSigma = (name, values, sigmas, unit) => values.map((value, at) => [`${name} ${"xyz"[at]}`, `${value.toFixed(3)} ± ${sigmas[at].toFixed(3)} ${unit}`]);
+    const rows = [["Markers measured", `${frame.measured} of ${this.pad.markers}`], ["Reader", `${frame.elapsed_ms.toFixed(1)} ms`], ["Source", `${frame.frames_per_s.toFixed(1)} frames/s`], ["Shown", `${shown.toFixed(1)} frames/s`], ["Frame", frame.index],
+      ["Largest displacement", frame.largest_mm === null ? "–" : `${number(frame.largest_mm, 3)} mm`]];
+    if (force) rows.push(...withSigma("Force", force.force_n, force.force_sigma_n, "N"), ...withSigma("Torque", force.torque_nmm, force.torque_sigma_nmm, "N mm"), ["Contacts", force.regions.length], ...(force.utilisation === null ? [] : [["Of the friction", force.utilisation < 1 ? `${number(100 * force.utilisation, 2)} %` : "slips"]]));
+    const notes = [...new Set([frame.reason, frame.contact?.reason, ...frame.hints].filter(Boolean))].map((text) => h("div", { class: `finding ${frame.tracked ? "warning" : "error"}` }, text));
+    this.health.replaceChildren(h("h2", {}, "Health"), figures(rows), ...notes);
+    this.words.textContent = frame.tracked ? `${this.pad.name} · frame ${frame.index}` : "The pattern is not found.";
+    this.#plotHistory(force);
+  }
+
+  #plotHistory(force) {
+    const { clientWidth: width, clientHeight: height } = this.plot, context = this.plot.getContext("2d");
+    if (!width) return;
+    Object.assign(this.plot, { width, height });
+    const known = this.history.flat().filter(Number.isFinite), low = Math.min(0, ...known), high = Math.max(1e-6, ...known);
+    const y = (value) => height - 6 - ((value - low) / (high - low)) * (height - 12);
+    this.history.at(-1).forEach((_, axis) => {
+      context.strokeStyle = AXIS_COLORS[axis];
+      context.beginPath();
+      this.history.forEach((values, at) => context.lineTo((at / PLOT_FRAMES) * width, y(values[axis] ?? NaN)));
+      context.stroke();
+    });
+    this.plotWords.textContent = force ? `Force, N: red x, green y, blue z; from ${number(low, 3)} to ${number(high, 3)}` : `Largest displacement, mm; to ${number(high, 3)}`;
+  }
+}
