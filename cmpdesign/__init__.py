@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from cmpdesign.api.plots import plot_history as plot_history
     from cmpdesign.api.plots import plot_layout as plot_layout
     from cmpdesign.api.plots import plot_markers as plot_markers
+    from cmpdesign.api.sequences import cameras as cameras
     from cmpdesign.api.sequences import load_run as load_run
     from cmpdesign.api.sequences import open_source as open_source
     from cmpdesign.api.sequences import reconstruct as reconstruct
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
     from cmpdesign.errors import OutputError as OutputError
     from cmpdesign.files.layout_json import layout_to_json as layout_to_json
     from cmpdesign.files.layout_json import write_layout as write_layout
+    from cmpdesign.inputs.cameras import CameraSettings as CameraSettings
     from cmpdesign.layout.checks import check_design as check_design
     from cmpdesign.products.drawing.svg import write_svg as write_svg
     from cmpdesign.proposal.camera_design import size as size
@@ -78,6 +80,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "CameraSettings": "cmpdesign.inputs.cameras",
     "CmpDesignError": "cmpdesign.errors",
     "Design": "cmpdesign.api.designs",
     "DesignError": "cmpdesign.errors",
@@ -94,6 +97,7 @@ _HOMES = {
     "calibrate_gel": "cmpdesign.api.force",
     "calibrate_pattern": "cmpdesign.api.workshop",
     "calibrate_rig": "cmpdesign.api.calibration",
+    "cameras": "cmpdesign.api.sequences",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",
     "export_lerobot": "cmpdesign.api.workshop",

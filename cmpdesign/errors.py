@@ -19,6 +19,10 @@ class InputError(CmpDesignError, ValueError):
     """A file that cannot be read, is no document of its format, or exceeds a limit."""
 
 
+class SourceError(CmpDesignError, ValueError):
+    """A picture, folder, video, camera or stream that does not exist, or cannot be opened."""
+
+
 class OutputError(CmpDesignError, OSError):
     """A file or folder that could not be written. Its previous content is unchanged."""
 

@@ -1,4 +1,4 @@
-"""Runs the reader's tests on native modules that check every index, address and arithmetic operation.
+"""Runs the reader's tests and attacks on it with native modules that check every index, address and operation.
 
     python -m tools.sanitized [arguments of pytest]
 
@@ -19,6 +19,8 @@ COPY = ROOT / "build" / "sanitized"
 PARTS = ("extractor", "cmpdesign", "tests", "templates", "docs", "benchmarks", "tools", "examples")
 FILES = ("pyproject.toml", "README.md", "CHANGELOG.md")
 TESTS = ("tests/extractor", "tests/cmpdesign/scene")
+# With their slow tests: 2,000 layouts edited in memory, and 2,000 pictures.
+ATTACKS = ("tests/attack/test_edited_layouts.py", "tests/attack/test_images.py")
 
 
 def copy_sources() -> None:
@@ -58,11 +60,12 @@ def main(arguments: list[str]) -> int:
     build()
     preloaded = f"{library('libasan.so')} {library('libstdc++.so')}"
     try:
-        run(
-            *(sys.executable, "-m", "pytest", "-n", "2", *(arguments or TESTS)),
-            LD_PRELOAD=preloaded,
-            ASAN_OPTIONS="detect_leaks=0:allocator_may_return_null=1",
-        )
+        for chosen in [arguments] if arguments else [TESTS, ("-m", "", *ATTACKS)]:
+            run(
+                *(sys.executable, "-m", "pytest", "-n", "2", *chosen),
+                LD_PRELOAD=preloaded,
+                ASAN_OPTIONS="detect_leaks=0:allocator_may_return_null=1",
+            )
     except subprocess.CalledProcessError as error:
         return error.returncode
     return 0

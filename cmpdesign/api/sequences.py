@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
@@ -11,7 +12,8 @@ from cmpdesign.inputs.options import settled
 from cmpdesign.tracking.jobs.options import ShapeOptions, TrackOptions
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.runs import ReconstructDocument, RecoverDocument, TrackDocument
+    from cmpdesign.documents.runs import CamerasDocument, ReconstructDocument, RecoverDocument, TrackDocument
+    from cmpdesign.inputs.cameras import CameraSettings
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.tracking.export.runs import Run
     from cmpdesign.tracking.jobs.job import ReconstructJob, TrackJob
@@ -146,7 +148,12 @@ def reconstruct_job(
 
 
 def open_source(
-    source: AnySource, fps: float | None = None, max_pixels: int = MOST_PIXELS, times: str | None = None
+    source: AnySource,
+    fps: float | None = None,
+    max_pixels: int = MOST_PIXELS,
+    times: str | None = None,
+    bits: int | None = None,
+    camera: CameraSettings | None = None,
 ) -> FrameSource:
     """Open a source of frames.
 
@@ -156,17 +163,41 @@ def open_source(
 
     Args:
         source: path of a picture, of a folder of pictures or of a video, a pattern such as "run*/*.png", a camera's
-            number, a stream ("rtsp://..."), or a sequence of pictures, folders and patterns.
+            number, file, serial number or a part of its name, a stream ("rtsp://..."), or a sequence of pictures,
+            folders and patterns.
         fps: frames per second of a folder (default 30), or instead of a video's own rate.
         max_pixels: largest frame that is read, width x height.
         times: see ``SequenceOptions``.
+        bits: see ``SequenceOptions``.
+        camera: settings that are asked of a camera; ``source.camera`` has the driver's answer.
 
     Raises:
         SourceError: the source cannot be opened.
     """
     from cmpdesign.tracking import sources
 
-    return sources.open_source(_texts(source), fps, max_pixels, times)
+    how = sources.Reading(fps, max_pixels, times, bits)
+    how = how if camera is None else replace(how, camera=camera)
+    return sources.open_source(_texts(source), how)
+
+
+def cameras() -> CamerasDocument:
+    """List the cameras of this machine (Linux): names, serial numbers, formats, sizes, rates and ranges of settings.
+
+    >>> [camera.name for camera in cmpdesign.cameras().cameras]
+
+    Raises:
+        SourceError: this system has no V4L2.
+    """
+    from dataclasses import asdict
+
+    from cmpdesign.documents.runs import CamerasDocument, ListedCameraPart
+    from cmpdesign.inputs.cameras import list_cameras
+
+    found = [asdict(camera) for camera in list_cameras()]
+    return CamerasDocument(
+        cameras=tuple(ListedCameraPart(**(camera.pop("offer") | camera)) for camera in found)
+    )
 
 
 def load_run(path: str | Path) -> Run:

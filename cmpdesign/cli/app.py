@@ -11,12 +11,22 @@ import typer
 
 from cmpdesign import __version__
 from cmpdesign.cli.command import Command, OneLineErrors, examples, exit_interrupted
-from cmpdesign.cli.commands import build, check, evaluate, kerf, reconstruct, render, size, track, verify
+from cmpdesign.cli.commands import (
+    build,
+    check,
+    evaluate,
+    kerf,
+    reconstruct,
+    render,
+    size,
+    track,
+    verify,
+)
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.pages import studio, view
-from cmpdesign.cli.commands.starting import init, schema, templates
+from cmpdesign.cli.commands.starting import cameras, init, schema, templates
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
 from cmpdesign.errors import OutputError
 
@@ -41,6 +51,7 @@ for module, function in (
     (check, check.check),
     (render, render.render),
     (verify, verify.verify),
+    (cameras, cameras.cameras),
     (track, track.track),
     (reconstruct, reconstruct.reconstruct),
     (dataset, dataset.dataset),

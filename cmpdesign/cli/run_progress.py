@@ -51,10 +51,11 @@ def run_and_report(job: Job[Summary], doing: str, show: Callable[[Summary], None
     """
     from cmpdesign.tracking.jobs.job import write_summary
 
-    run = job.prepare()
+    run: TrackingRun = job.prepare()
     print_step(f"{run.source.name} is open")
-    for warning in run.warnings:
+    for warning in (*run.warnings, *run.source.notes):
         print_warning(warning)
+    said = len(run.source.notes)
     try:
         run_with_progress(run, doing)
     except OutputError:
@@ -65,6 +66,8 @@ def run_and_report(job: Job[Summary], doing: str, show: Callable[[Summary], None
         raise
     if run.stop.is_requested and not run.statistics.frames:
         raise typer.Exit(exit_status(run))
+    for note in run.source.notes[said:]:
+        print_warning(note)
     done = write_summary(run, job)
     show(done)
     _print_written(done.written)

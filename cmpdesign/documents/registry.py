@@ -25,6 +25,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "check": (designs.CheckDocument,),
     "render": (runs.RenderDocument,),
     "verify": (reading.VerifyDocument,),
+    "cameras": (runs.CamerasDocument,),
     "track": (runs.TrackDocument, runs.RecoverDocument),
     "reconstruct": (runs.ReconstructDocument, runs.RecoverDocument),
     "dataset": (data.DatasetDocument, data.DatasetCheckDocument),

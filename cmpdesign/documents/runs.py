@@ -71,6 +71,63 @@ class TimesPart(Part):
     camera_clock_s: float | None = Field(description="The camera's own clock when time_s was 0.")
 
 
+class CameraPart(Part):
+    """What a camera used, as its driver answered; null where it does not say."""
+
+    camera_size: tuple[int, int] | None
+    camera_fps: float | None
+    camera_format: str | None
+    exposure_ms: float | None
+    gain: float | None
+    white_balance_k: float | None
+    focus: float | None
+    automatic: tuple[str, ...] = Field(description="Settings that the camera chose itself during the run.")
+    asked: dict[str, object] = Field(description="Settings that were asked for.")
+    backend: str = Field(description="OpenCV's name of the driver's interface.")
+
+
+class CameraFormatPart(Part):
+    """One size of one pixel format of a camera."""
+
+    format: str = Field(description="Four letters.")
+    size_px: tuple[int, int] = Field(description="Width and height.")
+    fps: tuple[float, ...] = Field(description="Rates, or the smallest and the largest.")
+
+
+class CameraRangePart(Part):
+    """The range of a setting of a camera."""
+
+    name: Literal["exposure", "gain", "white balance", "focus"]
+    least: float
+    most: float
+    step: float
+    usual: float = Field(description="The driver's default.")
+    unit: str = Field(description="ms or K; empty: the camera's own.")
+
+
+class ListedCameraPart(Part):
+    """A camera of this machine."""
+
+    number: int = Field(description="As track takes it.")
+    path: str
+    name: str
+    serial: str = Field(description="Empty where the camera states none.")
+    by_id: str = Field(
+        description="A file of the same name wherever the camera is plugged in; empty without one."
+    )
+    formats: tuple[CameraFormatPart, ...]
+    ranges: tuple[CameraRangePart, ...]
+    problem: str = Field(description="Why the camera cannot be asked.")
+
+
+class CamerasDocument(Document):
+    """The cameras that ``cameras`` lists."""
+
+    format: Literal["cmp-cameras"] = "cmp-cameras"
+    version: Literal[1] = 1
+    cameras: tuple[ListedCameraPart, ...]
+
+
 class PressPart(Part):
     """The frame with the largest press."""
 
@@ -113,6 +170,8 @@ class TrackDocument(Document):
     contact: ContactPart | None = Field(None, description="With --contact.")
     largest_displacement: LargestPart | None
     times: TimesPart
+    notes: tuple[str, ...] = Field((), description="What a user should know about the source.")
+    cameras: tuple[CameraPart, ...] = ()
     live: LivePart | None = Field(None, description="With --live.")
     written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
 
@@ -160,6 +219,8 @@ class ReconstructDocument(Document):
     contact: ContactPart | None = Field(None, description="With --contact.")
     largest_displacement: LargestPart | None
     times: TimesPart
+    notes: tuple[str, ...] = Field((), description="What a user should know about the source.")
+    cameras: tuple[CameraPart, ...] = ()
     live: LivePart | None = Field(None, description="With --live.")
     written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
 

@@ -18,9 +18,10 @@ from cmpdesign.errors import CmpDesignError, InputError, OutputError
 from cmpdesign.files.locks import Lock, try_lock
 from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.files import is_regular_file, path_exists, read_file
+from cmpdesign.inputs.records import Digest, Record, checked_record
 
 JOURNAL_NAME = "journal.jsonl"
-JOURNAL_VERSION = 2
+JOURNAL_VERSION = 3
 # Packages and modules that the results of trials depend on; of the compiled loops, the files that are loaded.
 HASHED_PACKAGES = (
     "extractor",
@@ -67,10 +68,23 @@ def _source_files(package: str) -> Iterator[tuple[str, Path]]:
             yield path.relative_to(folder).as_posix(), path
 
 
+class _Line(Record):
+    """The result of one trial."""
+
+    trial: str
+    result: Any
+    digest: Digest
+
+
+def _digest_of(key: str, result: Any) -> str:
+    return fingerprint({"trial": key, "result": result})
+
+
 class Journal:
     """Results by trial, on disk.
 
-    The first line holds the digests of conditions and code. An incomplete last line, left by a crash, is removed.
+    The first line holds the digests of conditions and code; every other line holds its own digest, so that an edited
+    result is no result. An incomplete last line, left by a crash, is removed.
 
     Attributes:
         path: the journal's file.
@@ -118,7 +132,7 @@ class Journal:
             OutputError: the file cannot be written; earlier results are kept.
         """
         try:
-            self._write_line({"trial": key, "result": result})
+            self._write_line({"trial": key, "result": result, "digest": _digest_of(key, result)})
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from error
         self.results[key] = result
@@ -153,13 +167,20 @@ class Journal:
             head, *documents = [
                 parse_json(line, f"line {number}") for number, line in enumerate(lines, start=1)
             ]
-            results = {str(document["trial"]): document["result"] for document in documents}
-        except (InputError, ValueError, KeyError, TypeError) as error:
+            lines_read = [
+                checked_record(each, f"line {n}", _Line) for n, each in enumerate(documents, start=2)
+            ]
+        except (InputError, ValueError) as error:
             raise CmpDesignError(
                 f"{self.path} is not the journal of a run ({error}); give another folder"
             ) from error
         self._require_same_conditions(head)
-        return results
+        for number, line in enumerate(lines_read, start=2):
+            if line.digest != _digest_of(line.trial, line.result):
+                raise CmpDesignError(
+                    f"{self.path}: line {number} was changed after it was written; remove the file to start anew"
+                )
+        return {line.trial: line.result for line in lines_read}
 
     def _require_same_conditions(self, head: Any) -> None:
         """Raise ``CmpDesignError`` for a journal of other conditions or of other code."""

@@ -12,28 +12,27 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
+from typing import Literal
 
 from cmpdesign.errors import InputError
-from cmpdesign.inputs.documents import read_json
-from cmpdesign.inputs.files import read_file
+from cmpdesign.inputs.files import read_file, read_text
+from cmpdesign.inputs.records import Digest, Record, parse_record
 
 LIST_NAME = ".cmpdesign-files.json"
 
 
-@dataclass(frozen=True)
-class _FileList:
-    """A list of files: digests by name, and the digest of the pattern ("" where the list names none)."""
+class _FileList(Record):
+    """A list of files: digests by name, and the digest of the pattern (None where the list names none)."""
 
-    digests: Mapping[str, str] = field(default_factory=dict)
-    pattern: str = ""
+    format: Literal["cmp-files"] = "cmp-files"
+    version: Literal[1] = 1
+    pattern: Digest | None = None
+    sha256: dict[str, Digest]
 
     def to_json(self) -> str:
-        document: dict[str, object] = {"format": "cmp-files", "version": 1}
-        if self.pattern:
-            document["pattern"] = self.pattern
-        return json.dumps(document | {"sha256": dict(sorted(self.digests.items()))}, indent=1) + "\n"
+        document = self.model_dump(exclude_none=True)
+        return json.dumps(document | {"sha256": dict(sorted(self.sha256.items()))}, indent=1) + "\n"
 
 
 def files_with_lists(
@@ -59,14 +58,14 @@ def files_with_lists(
             if path.startswith(folder)
         }
         if digests:
-            result[folder + LIST_NAME] = _FileList(digests, pattern).to_json()
+            result[folder + LIST_NAME] = _FileList(sha256=digests, pattern=pattern or None).to_json()
     if output is not None:
         earlier = _read_file_list(output / LIST_NAME)
-        kept = earlier.digests if earlier.pattern == pattern else {}
+        kept = earlier.sha256 if (earlier.pattern or "") == pattern else {}
         own = {
             path: _content_digest(data) for path, data in files.items() if not path.startswith(tuple(folders))
         }
-        result[LIST_NAME] = _FileList({**kept, **own}, pattern).to_json()
+        result[LIST_NAME] = _FileList(sha256={**kept, **own}, pattern=pattern or None).to_json()
     return result
 
 
@@ -97,7 +96,7 @@ def find_stale_files(
             continue
         found += [
             path
-            for path, digest in ((folder / listed, digest) for listed, digest in earlier.digests.items())
+            for path, digest in ((folder / listed, digest) for listed, digest in earlier.sha256.items())
             if path not in current and _is_below(path, folder) and _is_unchanged(path, digest)
         ]
         if folder / LIST_NAME not in current:
@@ -121,13 +120,9 @@ def remove_files(paths: Iterable[Path]) -> list[Path]:
 def _read_file_list(path: Path) -> _FileList:
     """An earlier list; an empty list if there is no valid list."""
     try:
-        document = read_json(path)
-        if (document["format"], document["version"]) != ("cmp-files", 1):
-            return _FileList()
-        digests = {str(name): str(digest) for name, digest in document["sha256"].items()}
-        return _FileList(digests, str(document.get("pattern", "")))
-    except (InputError, KeyError, TypeError, AttributeError):
-        return _FileList()
+        return parse_record(read_text(path), str(path), _FileList)
+    except InputError:
+        return _FileList(sha256={})
 
 
 def _is_below(path: Path, folder: Path) -> bool:

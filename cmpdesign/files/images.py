@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ SMALLEST_PX = 16
 _HEADER_BYTES = 1 << 16
 _TAIL_BYTES = 4096
 _JPEG_STREAMS = (".mjpeg", ".mjpg")
-_FEWEST_BITS, _MOST_BITS = 8, 14  # of a camera's values in a file of 16 bits
+FEWEST_BITS, _MOST_BITS = 8, 14  # of a camera's values in a file of 16 bits
 PNG_PIXELS_PER_BYTE = 8 * 1032  # at most: one bit a pixel, and deflate makes no more than 1032 bytes of one
 _NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
 # Endings of images that are written -> largest number of bits.
@@ -33,16 +34,31 @@ class ImageFileError(CmpDesignError, ValueError):
     """A file that is not a color image of sufficient size."""
 
 
-def read_image(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool = False) -> Image:
+@dataclass(frozen=True)
+class BitRange:
+    """Where values stand in 16 bits: below bit ``top``, from bit ``bottom`` on."""
+
+    top: int
+    bottom: int = 0
+
+    @property
+    def bits(self) -> int:
+        return self.top - self.bottom
+
+
+def read_image(
+    path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool = False, bits: int | None = None
+) -> Image:
     """Read the pixels of an image file.
 
     An alpha channel is dropped. A rotation in EXIF is not applied, because the sensor's pixels are measured;
-    ``cv2.imread`` applies it. Values of 10 to 14 bits in a file of 16 bits are scaled, see ``full_range``.
+    ``cv2.imread`` applies it. Values of 10 to 14 bits in a file of 16 bits are scaled to the whole range.
 
     Args:
         path: a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM file.
         most_pixels: limit of width x height; the header is tested before memory is taken.
         gray: grayscale images are read, too; their three channels are equal.
+        bits: bits of the values in a file of 16 bits; None: found from the values.
 
     Returns:
         (H, W, 3) uint8 or uint16, BGR.
@@ -51,7 +67,26 @@ def read_image(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool =
         ImageFileError: the file cannot be read, is no image, has one channel (unless ``gray``), has other than 8 or
             16 bits, or is smaller than 16 x 16 or larger than ``most_pixels`` pixels.
     """
+    pixels = read_stored(path, most_pixels, gray=gray)
+    return pixels if pixels.dtype != np.uint16 else full_range(pixels, range_of(pixels, path, bits))
+
+
+def read_stored(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool = False) -> Image:
+    """As ``read_image``, with the values as they are stored."""
     return _to_bgr(decode_image(path, most_pixels), Path(path), gray)
+
+
+def range_of(pixels: Image, path: str | Path, bits: int | None, used: int = 0) -> BitRange:
+    """Where the values of a picture stand in 16 bits; ``used``: the bits that earlier pictures use.
+
+    Raises:
+        ImageFileError: the values have more bits than stated.
+    """
+    used |= used_values(pixels)
+    try:
+        return bits_of(used) if bits is None else stated_bits(used, bits)
+    except ImageFileError as error:
+        raise ImageFileError(f"{path}: {error}") from None
 
 
 def is_image_file(path: str | Path) -> bool:
@@ -137,27 +172,49 @@ def _to_bgr(pixels: NDArray[Any], path: Path, gray: bool) -> Image:
         return np.ascontiguousarray(np.repeat(pixels.reshape(height, width, 1), 3, axis=2))
     if channels < 3:
         raise ImageFileError(f"{path} is a grayscale image; a multicolor pattern needs color (3 channels)")
-    return full_range(np.ascontiguousarray(pixels[:, :, :3]))
+    return np.ascontiguousarray(pixels[:, :, :3])
 
 
-def full_range(pixels: Image) -> Image:
-    """A picture of 16 bits with the whole range, of a camera with fewer bits.
+def used_values(pixels: Image) -> int:
+    """The bits that are set in any value."""
+    return int(np.bitwise_or.reduce(pixels, axis=None))
 
-    Cameras write 10 to 14 bits into the lower or into the upper bits. The bits that all values leave 0 are found, and
-    the others are scaled to 0 ... 65535, so that a clipped value is 65535 again. A dark picture becomes brighter, by a
-    factor; light that is linear stays linear.
+
+def bits_of(used: int) -> BitRange:
+    """Where a camera wrote its values into 16 bits, by the bits that pictures use, see ``used_values``.
+
+    Cameras write 10 to 14 bits into the lower or into the upper bits, and leave the others 0. From a dark picture alone
+    fewer bits are found than the camera has.
     """
-    if pixels.dtype != np.uint16:
-        return pixels
-    used = int(np.bitwise_or.reduce(pixels, axis=None))
     if not used:
-        return pixels
-    top, bottom = max(used.bit_length(), _FEWEST_BITS), (used & -used).bit_length() - 1
+        return BitRange(16)
+    top, bottom = max(used.bit_length(), FEWEST_BITS), (used & -used).bit_length() - 1
     if top > _MOST_BITS and bottom < 16 - _MOST_BITS:
+        return BitRange(16)
+    return BitRange(top, min(bottom, top - FEWEST_BITS))
+
+
+def stated_bits(used: int, bits: int) -> BitRange:
+    """Where values of a stated number of bits are.
+
+    Raises:
+        ImageFileError: the values have more bits.
+    """
+    if used < 1 << bits:
+        return BitRange(bits)
+    if used & ((1 << (16 - bits)) - 1):
+        raise ImageFileError(
+            f"its values have {used.bit_length()} bits, {parameter('bits')} states {bits}; leave it out, or give more"
+        )
+    return BitRange(16, 16 - bits)
+
+
+def full_range(pixels: Image, place: BitRange) -> Image:
+    """A picture of 16 bits with the whole range: light that is linear stays linear, a clipped value is 65535 again."""
+    if pixels.dtype != np.uint16 or place.bits == 16:
         return pixels
-    bottom = min(bottom, top - _FEWEST_BITS)
-    largest = (1 << (top - bottom)) - 1
-    scaled = (pixels >> bottom).astype(np.uint32) * 65535
+    largest = (1 << place.bits) - 1
+    scaled = (pixels >> place.bottom).astype(np.uint32) * 65535
     return ((scaled + largest // 2) // largest).astype(np.uint16)
 
 

@@ -13,17 +13,14 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
-from cmpdesign.errors import CmpDesignError, InputError
+from cmpdesign.errors import InputError, SourceError
+from cmpdesign.inputs.cameras import camera_of_path, find_camera
 from cmpdesign.inputs.files import is_folder, is_regular_file, open_file, path_exists
 from cmpdesign.inputs.frame_names import in_order_of_names
 
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"})
 _TAIL_BYTES = 4096
 _ADDRESS = re.compile(r"(rtsp|rtsps|rtmp|http|https|udp|tcp)://", re.IGNORECASE)
-
-
-class SourceError(CmpDesignError, ValueError):
-    """A source that does not exist, or cannot be opened."""
 
 
 class SourceKind(Enum):
@@ -44,7 +41,7 @@ class NamedSource:
         name: the texts, for messages; without the password of an address.
         paths: the files of ``IMAGES`` and of ``FILE``; within a folder or pattern in the order of their names'
             numbers, see ``frame_names``.
-        address: number, path or name of a camera, or address of a stream.
+        address: number of a camera, or address of a stream.
         left_out: number of files of a folder or pattern that are hidden, empty or cut off.
     """
 
@@ -60,10 +57,11 @@ def name_sources(texts: Iterable[str]) -> list[NamedSource]:
 
     Args:
         texts: each a picture, a folder of pictures, a pattern such as "run*/*.png" ("**" for any folders), a video,
-            the number of a camera, or the address of a stream. A path that exists is no pattern and no number.
+            a camera by its number, its file, its serial number or a part of its name, or the address of a stream. A
+            path that exists is no pattern, no number and no name.
 
     Raises:
-        SourceError: a folder cannot be read or holds no image, or no file matches a pattern.
+        SourceError: a folder cannot be read or holds no image, no file matches a pattern, or several cameras do.
     """
     found: list[NamedSource] = []
     for text in texts:
@@ -162,12 +160,19 @@ def _named_by(text: str) -> Sequence[NamedSource]:
     if is_stream_address(text):
         return [NamedSource(SourceKind.STREAM, without_password(text), address=text)]
     if path_exists(text):
-        return [_named_path(Path(text), text)]
+        number = camera_of_path(text)
+        return [_camera(text, number)] if number is not None else [_named_path(Path(text), text)]
     if text.isdecimal():
-        return [NamedSource(SourceKind.CAMERA, f"camera {text}", address=text)]
+        return [_camera(text, int(text))]
     if glob.has_magic(text):
         return _matching(text)
+    if "/" not in text and (camera := find_camera(text)) is not None:
+        return [_camera(camera.name, camera.number)]
     return [_named_path(Path(text), text)]
+
+
+def _camera(name: str, number: int) -> NamedSource:
+    return NamedSource(SourceKind.CAMERA, f"camera {name}", address=str(number))
 
 
 def _named_path(path: Path, name: str) -> NamedSource:

@@ -19,10 +19,9 @@ from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
-from cmpdesign.errors import parameter
+from cmpdesign.errors import SourceError, parameter
 from cmpdesign.inputs.file_kinds import describe_file
 from cmpdesign.inputs.files import MOST_PIXELS
-from cmpdesign.inputs.sources import SourceError
 from cmpdesign.libraries import extra
 
 # FFmpeg's names of formats: containers with times, and bare streams, whose times FFmpeg would invent.

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.images import read_image
-from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.live.view import LiveView
 from cmpdesign.tracking.overlay import OverlayWriter
 from cmpdesign.tracking.sinks.tables import FrameSink
-from cmpdesign.tracking.sources import FrameSource, open_source
+from cmpdesign.tracking.sources import FrameSource, Reading, open_source
 
 if TYPE_CHECKING:
     from extractor import Markers, Tracker
@@ -143,23 +142,21 @@ def stop_on_signal(stop: StopRequest) -> Iterator[None]:
 def read_rest_markers(
     text: str,
     source: str | Sequence[str],
-    fps: float | None,
+    how: Reading,
     tracker: Tracker,
-    most_pixels: int = MOST_PIXELS,
 ) -> Markers:
     """Extract the markers at rest.
 
     Args:
         text: number of a frame of the source, or path of an image file.
         source: the source, see ``open_source``.
-        fps: see ``open_source``.
+        how: how the source is read.
         tracker: a new tracker with the options of the run; it reads the image.
-        most_pixels: see ``open_source``.
 
     Raises:
         CmpDesignError: no such frame or image, or no pattern is found in the image.
     """
-    markers = tracker.track(read_rest_image(text, source, fps, most_pixels)).markers
+    markers = tracker.track(read_rest_image(text, source, how)).markers
     if not markers.found:
         name = f"frame {text}" if text.isdecimal() else text
         raise CmpDesignError(
@@ -172,18 +169,16 @@ def _why(markers: Markers) -> str:
     return "no image" if markers.reason is None else markers.reason.text
 
 
-def read_rest_image(
-    text: str, source: str | Sequence[str], fps: float | None, most_pixels: int = MOST_PIXELS
-) -> Any:
+def read_rest_image(text: str, source: str | Sequence[str], how: Reading) -> Any:
     """Read the image at rest; arguments as for ``read_rest_markers``.
 
     Raises:
         CmpDesignError: no such frame or image.
     """
     image = (
-        _read_frame(int(text), source, fps, most_pixels)
+        _read_frame(int(text), source, how)
         if text.isdecimal()
-        else read_image(Path(text), most_pixels)
+        else read_image(Path(text), how.max_pixels, bits=how.bits)
     )
     if image is None:
         name = f"frame {text}" if text.isdecimal() else text
@@ -191,8 +186,8 @@ def read_rest_image(
     return image
 
 
-def _read_frame(number: int, texts: str | Sequence[str], fps: float | None, most_pixels: int) -> Any:
-    source = open_source(texts, fps, most_pixels)
+def _read_frame(number: int, texts: str | Sequence[str], how: Reading) -> Any:
+    source = open_source(texts, replace(how, times=None))
     if source.is_live:
         raise CmpDesignError(
             f"at rest, frame {number}: a {source.name.partition(' ')[0]}'s frames cannot be read ahead; "

@@ -8,10 +8,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from cmpdesign.errors import SourceError
 from cmpdesign.files.images import is_image_file, to_png
-from cmpdesign.inputs.files import MOST_PIXELS, read_file
-from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind
-from cmpdesign.tracking.sources import open_named
+from cmpdesign.inputs.files import read_file
+from cmpdesign.inputs.sources import NamedSource, SourceKind
+from cmpdesign.tracking.sources import Reading, open_named
 
 
 class Picture(NamedTuple):
@@ -71,19 +72,21 @@ def count_images(sources: Iterable[NamedSource], frames: int | None) -> int | No
 
 
 def source_images(
-    sources: Sequence[NamedSource], frames: int | None = None, most_pixels: int = MOST_PIXELS
+    sources: Sequence[NamedSource],
+    frames: int | None = None,
+    how: Reading = Reading(),  # noqa: B008
 ) -> Iterator[SourceImage]:
     """The images of all sources; a source that cannot be opened counts as one image that cannot be read.
 
     Args:
         sources: from ``name_sources``.
         frames: number of frames of each video, camera or stream; None: all of a video, one of a camera or stream.
-        most_pixels: limit of width x height of an image or of a frame.
+        how: how the sources are read.
     """
     stems: set[str] = set()
     for source in sources:
         try:
-            opened = open_named(source, None, most_pixels)
+            opened = open_named(source, how)
         except SourceError as error:
             yield SourceImage(source.name, _new_stem(source.name, stems), None, str(error), None)
             continue

@@ -18,7 +18,7 @@ ROOMS = {
         "designs and layouts": "designs layouts proposal",
         "files, workshop and experiments": "layout files products workshop",
         "pictures": "pictures plots",
-        "sequences": "sequences tracking",
+        "sequences": "sequences tracking inputs",
         "calibration and force": "calibration force",
         "data sets": "datasets",
         "errors": "errors",

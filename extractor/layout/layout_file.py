@@ -83,7 +83,10 @@ def load_layout(path: str | PathLike[str]) -> Reference:
         LayoutError: the file cannot be read, is of another format or version, or contradicts itself; one line
             that names the file, the field, the value and what is expected.
     """
-    return parse_layout(read_text_file(path, MAX_BYTES, LayoutError), printable_path(path))
+    text = read_text_file(
+        path, MAX_BYTES, LayoutError, "a layout, a text in UTF-8; it comes first, then the pictures"
+    )
+    return parse_layout(text, printable_path(path))
 
 
 def parse_layout(text: str, name: str = "layout") -> Reference:

@@ -8,27 +8,48 @@ from os import PathLike
 
 from extractor.errors import ExtractorError
 
+# First bytes of files that are given in place of a text by mistake -> what they are.
+_BINARY = {
+    b"\x89PNG": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"II*\0": "a TIFF picture",
+    b"MM\0*": "a TIFF picture",
+    b"BM": "a BMP picture",
+    b"RIFF": "a picture or a video",
+    b"\x1a\x45\xdf\xa3": "a video",
+    b"PK\x03\x04": "a zip archive",
+    b"\x93NUMPY": "a NumPy array",
+}
 _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 
 
-def read_text_file(path: str | PathLike[str], most_bytes: int, error: type[ExtractorError]) -> str:
+def read_text_file(
+    path: str | PathLike[str],
+    most_bytes: int,
+    error: type[ExtractorError],
+    expected: str = "a text file in UTF-8",
+) -> str:
     """Read a regular file of UTF-8 text. The function does not wait for a pipe.
 
     Args:
         path: the file.
         most_bytes: limit of its size.
         error: the class of the errors that are raised; their messages begin with the path.
+        expected: what another file would be, for the message.
 
     Raises:
         ExtractorError: of the class ``error``: the file cannot be opened, is no regular file, is larger than the
             limit, or is not UTF-8.
     """
-    data = read_bytes_file(path, most_bytes, error)
+    data = read_bytes_file(path, most_bytes, error, expected)
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as problem:
         name = printable_path(path)
-        raise error(f"{name}: byte {problem.start} is not UTF-8; expected a text file in UTF-8") from None
+        kind = next((text for start, text in _BINARY.items() if data.startswith(start)), "")
+        kind = kind or ("a video" if data[4:8] == b"ftyp" else "")
+        what = f"is {kind}" if kind else f"byte {problem.start} is not UTF-8"
+        raise error(f"{name}: {what}; expected {expected}") from None
 
 
 def read_bytes_file(
@@ -49,18 +70,18 @@ def read_bytes_file(
     except ValueError as problem:  # a NUL in the path, or characters that no path can hold
         raise error(f"{name}: cannot be read: {problem}") from None
     try:
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode):
+            kind = _KINDS.get(stat.S_IFMT(found.st_mode), "a device")
+            raise error(f"{name}: cannot be read: it is {kind}; expected {expected}")
         with os.fdopen(descriptor, "rb", closefd=False) as file:
-            found = os.fstat(descriptor)
-            mode = found.st_mode
-            kind = None if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "a device")
-            # ``read`` allocates the requested number of bytes.
-            data = b"" if kind else file.read(min(found.st_size, most_bytes) + 1)
+            data = file.read(
+                min(found.st_size, most_bytes) + 1
+            )  # ``read`` allocates the requested number of bytes
     except OSError as problem:
         raise error(f"{name}: cannot be read: {problem.strerror}") from None
     finally:
         os.close(descriptor)
-    if kind:
-        raise error(f"{name}: cannot be read: it is {kind}; expected a regular file")
     if len(data) > most_bytes:
         raise error(f"{name}: larger than {most_bytes >> 20} MiB; expected {expected}")
     return data

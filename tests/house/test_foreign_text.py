@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("cmpdesign", "extractor")
 PRINTS = {
     "cmpdesign/cli/terminal.py",
+    "cmpdesign/__main__.py",  # one fixed line, before terminal.py is loaded
 }
 PRINTING = {"print", "echo", "secho", "Console", "Text", "Panel", "pprint"}
 CONSOLE = re.compile(r"console\([^()]*\)\.print")  # of the console that terminal.py makes
@@ -36,6 +37,7 @@ READS = {
     "cmpdesign/files/locks.py": {"os.open"},  # to lock: nothing is read
     "cmpdesign/files/atomic.py": {"os.open", "open 'rb+'"},  # to flush to disk what it wrote
     "cmpdesign/tracking/sources/live.py": {"cv2.VideoCapture"},  # of a camera
+    "cmpdesign/inputs/cameras/v4l2.py": {"os.open"},  # of a camera, to ask its driver
     "cmpdesign/inputs/videos.py": {"open 'r'"},  # of a video or a stream, by PyAV
     "cmpdesign/files/video_writer.py": {"cv2.VideoCapture"},  # of the video that it wrote
     "cmpdesign/tracking/sinks/csv_recovery.py": {"open 'r+b'"},  # to cut the text behind its last whole frame

@@ -84,6 +84,14 @@ def verify(
             "stream]",
         ),
     ] = None,
+    bits: Annotated[
+        int | None,
+        typer.Option(
+            min=8,
+            max=16,
+            help="Bits of the camera's values in pictures of 16 bits. [default: found from the values]",
+        ),
+    ] = None,
     preset: PresetOption = "balanced",
     response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
     channels: ChannelsOption = "bgr",
@@ -93,6 +101,7 @@ def verify(
     from cmpdesign.api.pictures import Verifier
     from cmpdesign.inputs.sources import name_sources
     from cmpdesign.tracking.source_images import count_images, source_images
+    from cmpdesign.tracking.sources import Reading
     from extractor import load_layout
 
     require_suffix("--report", report, [".zip"])
@@ -105,7 +114,7 @@ def verify(
     sources = name_sources(images)
     outcomes = []
     with progress_bar("verifying", count_images(sources, frames), unit="pictures") as advance:
-        for image in source_images(sources, frames, max_pixels):
+        for image in source_images(sources, frames, Reading(max_pixels=max_pixels, bits=bits)):
             outcomes.append(verifier.verify_image(image))
             advance("")
     document = _to_document(reference, outcomes, min_share)

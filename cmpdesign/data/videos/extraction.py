@@ -15,10 +15,10 @@ from cmpdesign.data.folder import Prepared, file_digest, plan_digest, read_plan
 from cmpdesign.data.named_files import named_layouts
 from cmpdesign.data.records import FORMAT_EXTRACTION
 from cmpdesign.data.videos.pieces import NumberedFrame, Piece, piece_frames, video_pieces
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.errors import CmpDesignError, SourceError
 from cmpdesign.files.images import ImageFileError, is_image_file, read_image
 from cmpdesign.files.layout_json import layout_to_json, pattern_digest
-from cmpdesign.inputs.sources import SourceError, SourceKind, name_sources
+from cmpdesign.inputs.sources import SourceKind, name_sources
 from cmpdesign.reading.read_layout import layout_from_reference
 from extractor import Extractor, Reference
 from extractor.image.input import Channels

@@ -64,9 +64,9 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     files |= {f"{FOLDER}/pad-{mesh.name}.stl": mesh_to_stl(mesh) for mesh in pad}
     laid_out = place_side_by_side(stack, mold)
     files[f"{FOLDER}/mold.glb"] = meshes_to_glb(laid_out)
-    files[f"{FOLDER}/mold.3mf"] = meshes_to_3mf(laid_out, f"{design.name} mold")
+    files[f"{FOLDER}/mold.3mf"] = meshes_to_3mf(laid_out, f"{design.name} mold", is_one_piece=False)
     files[f"{FOLDER}/pad.glb"] = meshes_to_glb(pad, OPACITY)
-    files[f"{FOLDER}/pad.3mf"] = meshes_to_3mf(pad, f"{design.name} pad")
+    files[f"{FOLDER}/pad.3mf"] = meshes_to_3mf(pad, f"{design.name} pad", is_one_piece=True)
     pictures = mold_pictures(parts, mold)
     pngs = {name: to_png(picture) for name, picture in pictures.items()}
     files |= {f"{FOLDER}/pictures/{name}.png": png for name, png in pngs.items()}

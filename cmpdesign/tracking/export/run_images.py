@@ -11,7 +11,7 @@ from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 from cmpdesign.tracking.export.runs import Run
 from cmpdesign.tracking.export.video import pixels_of
-from cmpdesign.tracking.sources import open_source
+from cmpdesign.tracking.sources import Reading, open_source
 
 Picture = NDArray[np.uint8]
 
@@ -27,7 +27,7 @@ def run_images(run: Run, source: str, most_pixels: int = MOST_PIXELS) -> Iterato
     Raises:
         CmpDesignError: the source cannot be opened, is live, has fewer frames than the run, or frames of two sizes.
     """
-    opened = open_source(source, None, most_pixels)
+    opened = open_source(source, Reading(max_pixels=most_pixels))
     if opened.is_live:
         raise CmpDesignError(
             f"{parameter('images')} {source}: frames of a camera or stream cannot be read again; give a video or "

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
     from cmpdesign.contact.elastomer import Elastomer
     from cmpdesign.tracking.run import TrackingRun
+    from cmpdesign.tracking.sources import Reading
     from extractor import ContactTracker, Markers, Reference, Tracker
     from extractor.contact import ContactReader
 
@@ -44,6 +45,27 @@ class Job(Protocol[Summary]):
     def pictures(self, run: TrackingRun) -> dict[Path, bytes]: ...
 
     def document(self, fields: dict[str, Any]) -> Summary: ...
+
+
+def reading_of(options: SequenceOptions) -> Reading:
+    """How the source is read.
+
+    Raises:
+        SourceError: a camera's size or format that cannot be.
+    """
+    from cmpdesign.inputs.cameras import CameraSettings, size_from
+    from cmpdesign.tracking.sources import Reading
+
+    camera = CameraSettings(
+        size_from(options["camera_size"]),
+        options["camera_fps"],
+        options["camera_format"],
+        options["exposure_ms"],
+        options["gain"],
+        options["white_balance_k"],
+        options["focus"],
+    )
+    return Reading(options["fps"], options["max_pixels"], options["times"], options["bits"], camera)
 
 
 def recording_of(options: SequenceOptions) -> Recording:
@@ -94,7 +116,7 @@ class TrackJob:
         from cmpdesign.tracking.table import TrackTable
         from extractor import Tracker
 
-        how, source = self.options, self.source
+        how, source, reading = self.options, self.source, reading_of(self.options)
         quiver, viewer = _path(how["quiver"]), viewer_of(how)
         if quiver is not None and quiver.suffix.lower() != ".png":
             raise CmpDesignError(f"{parameter('quiver')} {quiver}: unknown ending; expected .png")
@@ -109,7 +131,7 @@ class TrackJob:
         )
         at_rest, rest = None, how["rest"]
         if rest is not None:
-            at_rest = read_rest_markers(str(rest), source, how["fps"], new_tracker(), how["max_pixels"])
+            at_rest = read_rest_markers(str(rest), source, reading, new_tracker())
         plain = new_tracker(rest=at_rest, mm_per_px=how["mm_per_px"])
         tracker: Tracker | ContactTracker = plain
         contact, gel, rig = None, _path(how["contact"]), _path(how["rig"])
@@ -118,7 +140,7 @@ class TrackJob:
         if gel is not None and rig is not None:
             contact = _contact_reader(gel, rig, self.layout)
             tracker = _contact_tracker(plain, rig, contact, at_rest)
-        frames = open_source(source, how["fps"], how["max_pixels"], how["times"])
+        frames = open_source(source, reading)
         video = None
         if self.overlay is not None:
             video = OverlayWriter(self.overlay, self.layout, frames.fps or DEFAULT_FPS)
@@ -195,7 +217,7 @@ class ReconstructJob:
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
         gel = _path(how["contact"])
         contact = None if gel is None else _contact_reader(gel, self.rig, views.layout)
-        source = open_sources(self.source, how["fps"], how["max_pixels"], how["times"])
+        source = open_sources(self.source, reading_of(how))
         is_one_a_view = len(split_list(self.source)) > 1
         recording = replace(recording_of(how), views=rig.views, is_image_one_a_view=is_one_a_view)
         outputs = open_outputs(
@@ -253,7 +275,7 @@ class ReconstructJob:
                 "give the same number of both"
             )
         images = [
-            read_rest_image(rest, name, self.options["fps"], self.options["max_pixels"])
+            read_rest_image(rest, name, reading_of(self.options))
             for rest, name in zip(rests, sources, strict=True)
         ]
         return images if len(images) > 1 else images[0]
@@ -288,16 +310,19 @@ def write_summary(run: TrackingRun, job: Job[Summary]) -> Summary:
         raise CmpDesignError(f"{run.source.name}: no frame could be read")
     summary = job.summary(run)
     summary["times"] = run.source.times.to_json()
+    summary["notes"] = list(run.source.notes)
+    summary["cameras"] = [state.to_json() for state in run.source.camera]
     if run.live is not None:
         summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
     # Tables of several formats in one folder have a summary each.
     place = job.output.with_name(job.output.name + ".summary.json")
+    document = job.document(summary)  # its schema is that of the file
     contents: dict[Path, str | bytes] = {place: json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
     contents |= job.pictures(run)
     for path, content in contents.items():
         write_file(path, content)
     written = (job.output, *contents, *([] if job.overlay is None else [job.overlay]))
-    return job.document({**summary, "written": tuple(visible(str(path)) for path in written)})
+    return document.model_copy(update={"written": tuple(visible(str(path)) for path in written)})
 
 
 def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuation:

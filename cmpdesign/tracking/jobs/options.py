@@ -18,6 +18,14 @@ class SequenceOptions(TypedDict, total=False):
         fps: frames per second; None: a video's own; 30 for a folder.
         times: times of the frames: names (their numbers), index (the count), or a .csv of FRAME,SECONDS; None: what the
             names say; a video's own.
+        bits: bits of the camera's values in pictures of 16 bits, 8 to 16; None: found from the values.
+        camera_size: size that a camera is asked for.
+        camera_fps: frames per second that a camera is asked for.
+        camera_format: pixel format that a camera is asked for, four letters as MJPG or YUYV.
+        exposure_ms: time of exposure, ms; switches automatic exposure off.
+        gain: gain in the camera's own unit, as cameras prints it.
+        white_balance_k: color temperature, K; switches automatic white balance off.
+        focus: focus in the camera's own unit; switches automatic focus off.
         frames: stop after this many frames.
         cold: number every frame without the previous frame: slower.
         preset: speed or accuracy of the positions; the ids are the same.
@@ -34,6 +42,14 @@ class SequenceOptions(TypedDict, total=False):
 
     fps: Annotated[float | None, Usual(None, above=0)]
     times: Annotated[str | None, Usual(None, metavar="names|index|FILE")]
+    bits: Annotated[int | None, Usual(None, least=8)]
+    camera_size: Annotated[str | None, Usual(None, metavar="WIDTHxHEIGHT")]
+    camera_fps: Annotated[float | None, Usual(None, metavar="FPS", above=0)]
+    camera_format: Annotated[str | None, Usual(None, metavar="LETTERS")]
+    exposure_ms: Annotated[float | None, Usual(None, metavar="MS", above=0, name="--exposure")]
+    gain: Annotated[float | None, Usual(None, least=0)]
+    white_balance_k: Annotated[float | None, Usual(None, metavar="K", above=0, name="--white-balance")]
+    focus: Annotated[float | None, Usual(None, least=0)]
     frames: Annotated[int | None, Usual(None, least=1)]
     cold: Annotated[bool, Usual(False)]
     preset: Annotated[Preset, Usual("balanced")]

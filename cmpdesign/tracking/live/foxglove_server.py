@@ -10,6 +10,7 @@ from typing import Any
 
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.libraries import extra
+from cmpdesign.tracking.live.gate import Gate, hidden_address
 from cmpdesign.tracking.live.options import HOST
 from cmpdesign.tracking.recording.frames import ImagePlace, RecordedFrame
 from cmpdesign.tracking.recording.topics import TopicMessages
@@ -35,7 +36,7 @@ def require_foxglove() -> Any:
 
 
 class FoxgloveServer:
-    """Serves frames.
+    """Serves frames to viewers that the gate lets in.
 
     Args:
         frame_id: the coordinate frame of the markers, and the first part of all topics but the diagnostics'.
@@ -56,18 +57,23 @@ class FoxgloveServer:
         self._channels: dict[str, Any] = {}
         for topic, kind in self._messages.kinds(places, has_contact).items():
             self._channel(topic, kind)
-        self._watch = _watch_log(self._foxglove)
+        self._watch, inner = _watch_log(self._foxglove), hidden_address()
         try:
             self._server = self._foxglove.start_server(
                 name=f"cmpdesign: {frame_id}",
-                host=HOST,
-                port=port,
+                host=inner,
+                port=0,
                 context=self._context,
                 message_backlog_size=BACKLOG_MESSAGES,
             )
         except RuntimeError as error:
-            raise CmpDesignError(f"{parameter('live_port')} {port}: cannot be opened ({error})") from None
-        self.address = f"ws://{HOST}:{self._server.port}"
+            raise CmpDesignError(f"{parameter('live')} foxglove: cannot be opened ({error})") from None
+        try:
+            self._gate = Gate(HOST, port, (inner, self._server.port))
+        except CmpDesignError:
+            self._server.stop()
+            raise
+        self.address = f"ws://{HOST}:{self._gate.port}"
 
     def wait(self, seconds: float) -> bool:
         """Wait until a viewer has subscribed to a topic."""
@@ -92,6 +98,7 @@ class FoxgloveServer:
     def close(self) -> None:
         if self._is_watched():
             time.sleep(CLOSE_S)
+        self._gate.close()
         self._server.stop()
         for channel in self._channels.values():
             channel.close()

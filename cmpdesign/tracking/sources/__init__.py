@@ -3,8 +3,9 @@
 In: what ``inputs.sources`` names. Out: frames with times, and how the times were found.
 """
 
-from cmpdesign.inputs.sources import SourceError as SourceError
+from cmpdesign.errors import SourceError as SourceError
 from cmpdesign.tracking.sources.frame_source import FrameSource as FrameSource
+from cmpdesign.tracking.sources.frame_source import Reading as Reading
 from cmpdesign.tracking.sources.frame_source import SourceFrame as SourceFrame
 from cmpdesign.tracking.sources.frame_source import SourceTimes as SourceTimes
 from cmpdesign.tracking.sources.opening import open_named as open_named

@@ -3,10 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
+
+from cmpdesign.errors import SourceError, parameter
+from cmpdesign.files.images import FEWEST_BITS
+from cmpdesign.inputs.cameras import CameraSettings, CameraState
+from cmpdesign.inputs.files import MOST_PIXELS
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a source is read.
+
+    Attributes:
+        fps: frames per second of pictures (None: 30), or instead of a video's own rate.
+        max_pixels: limit of width x height of an image or of a frame.
+        times: "names", "index", or a file of times; None: what the source says.
+        bits: bits of a camera's values in pictures of 16 bits; None: found from the values.
+        camera: settings that are asked of a camera.
+
+    Raises:
+        SourceError: a number of bits that no picture has.
+    """
+
+    fps: float | None = None
+    max_pixels: int = MOST_PIXELS
+    times: str | None = None
+    bits: int | None = None
+    camera: CameraSettings = field(default_factory=CameraSettings)
+
+    def __post_init__(self) -> None:
+        if self.bits is not None and not FEWEST_BITS <= self.bits <= 16:
+            raise SourceError(f"{parameter('bits')} is {self.bits}; expected {FEWEST_BITS} to 16")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +110,8 @@ class FrameSource(Protocol):
         ended_early: after the last frame, the reason for an early end; "" if all frames were read.
         is_live: the frames are read while they are taken: no number is declared, and only a stop ends the source.
         times: how times are found; for a live source final after the last frame.
+        notes: what a user should know, one sentence each; more may come with the frames.
+        camera: what each camera uses, as its driver answers; none of other sources.
     """
 
     name: str
@@ -89,5 +122,11 @@ class FrameSource(Protocol):
 
     @property
     def times(self) -> SourceTimes: ...
+
+    @property
+    def notes(self) -> list[str]: ...
+
+    @property
+    def camera(self) -> tuple[CameraState, ...]: ...
 
     def frames(self) -> Iterator[SourceFrame]: ...

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from typing import Any
 
-from cmpdesign.errors import parameter
+from cmpdesign.errors import SourceError, parameter
+from cmpdesign.files.images import ImageFileError, decode_bytes
+from cmpdesign.inputs.cameras import CameraSettings, CameraState, set_camera
 from cmpdesign.inputs.files import MOST_PIXELS
-from cmpdesign.inputs.sources import SourceError, without_password
-from cmpdesign.inputs.videos import decoded_frames, opened_stream, packets_of
+from cmpdesign.inputs.sources import has_jpeg_end, without_password
+from cmpdesign.inputs.videos import CUT_OFF, decoded_frames, opened_stream, packets_of
 from cmpdesign.tracking.sources.frame_source import SourceFrame, SourceTimes
 
 MAX_FAILED_READS = 10  # consecutive failures after which a camera counts as ended
@@ -88,6 +90,8 @@ class StreamSource:
         self.total: int | None = None
         self.fps: float | None = None
         self._clock = LiveClock()
+        self.notes: list[str] = []
+        self.camera: tuple[CameraState, ...] = ()
 
     @property
     def times(self) -> SourceTimes:
@@ -107,23 +111,34 @@ class StreamSource:
 class CameraSource:
     """A camera, read by OpenCV.
 
+    A camera that sends JPEG, as most do by USB, is asked for the bytes: a frame that is cut off has no image, where
+    OpenCV would show what there is.
+
     Args:
         capture: OpenCV's reader of the open camera.
         name: name for messages.
         most_pixels: limit of width x height of a frame.
+        settings: what is asked of the camera.
 
     Raises:
-        SourceError: the frames are too large.
+        SourceError: the frames are too large, or a setting cannot be asked for.
     """
 
     is_live = True
 
-    def __init__(self, capture: Any, name: str, most_pixels: int = MOST_PIXELS) -> None:
+    def __init__(self, capture: Any, name: str, most_pixels: int, settings: CameraSettings) -> None:
+        import cv2
+
         self._capture = capture
-        _require_frame_size(self._capture, name, most_pixels)
+        state = set_camera(capture, settings, name)
+        _require_frame_size(state, name, most_pixels)
+        self._most_pixels = most_pixels
+        self._is_jpeg = state.sends_jpeg and bool(capture.set(cv2.CAP_PROP_CONVERT_RGB, 0))
         self.name, self.ended_early = name, ""
         self.total: int | None = None
         self.fps: float | None = None
+        self.notes = [f"{name}: {note}" for note in state.notes()]
+        self.camera: tuple[CameraState, ...] = (state,)
         self._clock = LiveClock()
 
     @property
@@ -137,27 +152,46 @@ class CameraSource:
         failed, index = 0, 0
         try:
             while failed < MAX_FAILED_READS:
-                success, image = self._capture.read()
-                has_image = success and image is not None
-                stamp_s = float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) / 1e3 if has_image else float("nan")
+                read = self._read()
+                has_frame = read is not None
+                stamp_s = float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) / 1e3 if has_frame else float("nan")
                 time_s = self._clock.time_s(stamp_s, time.monotonic())
-                if has_image:
-                    failed = 0
-                    yield SourceFrame(time_s, image)
-                else:
-                    failed += 1
-                    yield SourceFrame(time_s, None, "the camera gave no image")
+                failed = 0 if has_frame else failed + 1
+                yield (
+                    self._frame(time_s, read)
+                    if has_frame
+                    else SourceFrame(time_s, None, "the camera gave no image")
+                )
                 index += 1
         finally:
             self._capture.release()
         self.ended_early = f"the camera stopped after {index - failed} frames"
 
+    def _read(self) -> Any:
+        """What OpenCV gives; None without a frame, also where it fails on a driver's answer."""
+        import cv2
 
-def _require_frame_size(capture: Any, name: str, most_pixels: int) -> None:
+        with suppress(cv2.error):
+            success, read = self._capture.read()
+            return read if success else None
+        return None
+
+    def _frame(self, time_s: float, read: Any) -> SourceFrame:
+        if not self._is_jpeg:
+            return SourceFrame(time_s, read)
+        data = read.tobytes()
+        if not has_jpeg_end(data):
+            return SourceFrame(time_s, None, CUT_OFF)
+        try:
+            image = decode_bytes(data, "the camera's JPEG", self._most_pixels)
+        except ImageFileError as error:
+            return SourceFrame(time_s, None, str(error))
+        return SourceFrame(time_s, image)
+
+
+def _require_frame_size(state: CameraState, name: str, most_pixels: int) -> None:
     """Raise ``SourceError`` for declared frames of more than ``most_pixels`` pixels."""
-    import cv2
-
-    width, height = (int(capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+    width, height = state.settings.camera_size or (0, 0)
     if width * height > most_pixels:
         raise SourceError(
             f"{name}: the frames have {width} x {height} px; the limit is {most_pixels / 1e6:.4g} megapixels "
@@ -165,7 +199,7 @@ def _require_frame_size(capture: Any, name: str, most_pixels: int) -> None:
         )
 
 
-def open_camera(number: int, name: str, most_pixels: int = MOST_PIXELS) -> CameraSource:
+def open_camera(number: int, name: str, most_pixels: int, settings: CameraSettings) -> CameraSource:
     """Open a camera by its number, without OpenCV's messages on stderr.
 
     Raises:
@@ -177,10 +211,11 @@ def open_camera(number: int, name: str, most_pixels: int = MOST_PIXELS) -> Camer
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         capture = cv2.VideoCapture(number, cv2.CAP_ANY)
+        if not capture.isOpened():
+            raise SourceError(
+                f"{name} cannot be opened; check that it is connected and that no other program uses it; "
+                "the command cameras lists the cameras"
+            )
+        return CameraSource(capture, name, most_pixels, settings)
     finally:
         cv2.utils.logging.setLogLevel(level)
-    if not capture.isOpened():
-        raise SourceError(
-            f"{name} cannot be opened; check that it is connected and that no other program uses it"
-        )
-    return CameraSource(capture, name, most_pixels)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from cmpdesign.errors import parameter
+from cmpdesign.errors import SourceError, parameter
 from cmpdesign.files.images import is_image_file
-from cmpdesign.inputs.files import MOST_PIXELS, path_exists
-from cmpdesign.inputs.sources import NamedSource, SourceError, SourceKind, name_sources
-from cmpdesign.tracking.sources.frame_source import FrameSource
+from cmpdesign.inputs.files import path_exists
+from cmpdesign.inputs.sources import NamedSource, SourceKind, name_sources
+from cmpdesign.tracking.sources.frame_source import FrameSource, Reading
 from cmpdesign.tracking.sources.live import StreamSource, open_camera
 from cmpdesign.tracking.sources.pictures import ImagesSource
 from cmpdesign.tracking.sources.time_table import TimeTable, read_time_table
@@ -19,18 +19,14 @@ from cmpdesign.tracking.sources.views import MultiViewSource
 
 def open_source(
     source: str | Sequence[str],
-    fps: float | None = None,
-    most_pixels: int = MOST_PIXELS,
-    times: str | None = None,
+    how: Reading = Reading(),  # noqa: B008
 ) -> FrameSource:
     """Open the source that one text or several texts name, see ``name_sources``: consecutive pictures, the parts of a
     split recording, or one other source.
 
     Args:
         source: the texts.
-        fps: frames per second of pictures (default 30), or instead of a video's own rate.
-        most_pixels: limit of width x height of an image or of a frame.
-        times: "names", "index", or a file of times; None: what the source says.
+        how: how the source is read.
 
     Raises:
         SourceError: a source cannot be opened, or several are neither pictures nor videos.
@@ -39,10 +35,10 @@ def open_source(
     if not named:
         raise SourceError("no source is given")
     if len(named) == 1:
-        return open_named(named[0], fps, most_pixels, times)
+        return open_named(named[0], how)
     paths = [path for each in named for path in each.paths if each.kind is SourceKind.FILE]
     if len(paths) == len(named) and all(map(is_video_part, paths)):
-        return VideoSource(paths, fps, most_pixels, _wanted_times(times))
+        return VideoSource(paths, how.fps, how.max_pixels, _wanted_times(how.times))
     first = next(each for each in named if each.kind is not SourceKind.IMAGES)
     raise SourceError(
         f"{first.name}: cannot be one of {len(named)} sources; give pictures only, the videos of one recording, or one "
@@ -50,32 +46,31 @@ def open_source(
     )
 
 
-def open_named(
-    source: NamedSource, fps: float | None = None, most_pixels: int = MOST_PIXELS, times: str | None = None
-) -> FrameSource:
+def open_named(source: NamedSource, how: Reading = Reading()) -> FrameSource:  # noqa: B008
     """Open a source that ``name_sources`` found; see ``open_source``.
 
     Raises:
         SourceError: the source cannot be opened.
     """
-    wanted = _wanted_times(times)
+    wanted = _wanted_times(how.times)
+    if how.camera.asked and source.kind is not SourceKind.CAMERA:
+        name = next(iter(how.camera.asked))
+        raise SourceError(f"{source.name} is no camera: {parameter(name)} is for cameras; leave it out")
     if source.address and wanted is not None:
         raise SourceError(
             f"{source.name}: {parameter('times')} is for files; a camera and a stream have their own times"
         )
     match source.kind:
         case SourceKind.STREAM:
-            return StreamSource(source.address, most_pixels)
+            return StreamSource(source.address, how.max_pixels)
         case SourceKind.CAMERA:
-            return open_camera(int(source.address), source.name, most_pixels)
+            return open_camera(int(source.address), source.name, how.max_pixels, how.camera)
         case SourceKind.FILE if not is_image_file(source.paths[0]):
-            return VideoSource(source.paths, fps, most_pixels, wanted)
-    return ImagesSource(source.paths, source.name, fps, most_pixels, wanted, source.left_out)
+            return VideoSource(source.paths, how.fps, how.max_pixels, wanted)
+    return ImagesSource(source.paths, source.name, how, wanted, source.left_out)
 
 
-def open_sources(
-    text: str, fps: float | None = None, most_pixels: int = MOST_PIXELS, times: str | None = None
-) -> FrameSource:
+def open_sources(text: str, how: Reading = Reading()) -> FrameSource:  # noqa: B008
     """Open a source, or for a list with commas one source for each view; see ``open_source``.
 
     Raises:
@@ -83,8 +78,8 @@ def open_sources(
     """
     names = split_list(text)
     if len(names) == 1:
-        return open_source(text, fps, most_pixels, times)
-    return MultiViewSource([open_source(name, fps, most_pixels, times) for name in names])
+        return open_source(text, how)
+    return MultiViewSource([open_source(name, how) for name in names])
 
 
 def split_list(text: str) -> list[str]:

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
-from cmpdesign.errors import parameter
-from cmpdesign.files.images import ImageFileError, read_image
-from cmpdesign.inputs.files import MOST_PIXELS
+import numpy as np
+
+from cmpdesign.errors import SourceError, parameter
+from cmpdesign.files.images import Image, ImageFileError, full_range, range_of, read_stored, used_values
+from cmpdesign.inputs.cameras import CameraState
 from cmpdesign.inputs.frame_names import NS_PER_S, NamedTimes, read_names
-from cmpdesign.inputs.sources import SourceError
-from cmpdesign.tracking.sources.frame_source import SourceFrame, SourceTimes
+from cmpdesign.tracking.sources.frame_source import Reading, SourceFrame, SourceTimes
 from cmpdesign.tracking.sources.time_table import TimeTable
 
 DEFAULT_FPS = 30.0
@@ -24,8 +25,7 @@ class ImagesSource:
     Args:
         paths: the files.
         name: name for messages.
-        fps: rate at which frames, or the numbers in names, are counted; None: 30.
-        most_pixels: limit of width x height.
+        how: ``fps``: rate at which frames, or the numbers in names, are counted; None: 30.
         times: "names", "index", a table, or None: what the names say, else the index.
         left_out: number of files that are no frames.
 
@@ -39,13 +39,14 @@ class ImagesSource:
         self,
         paths: Sequence[Path],
         name: str,
-        fps: float | None = None,
-        most_pixels: int = MOST_PIXELS,
+        how: Reading,
         times: str | TimeTable | None = None,
         left_out: int = 0,
     ) -> None:
-        self._paths, self._most_pixels = tuple(paths), most_pixels
+        self._paths, self._how, fps = tuple(paths), how, how.fps
         self.name, self.ended_early = name, ""
+        self._used, self._bits = 0, 16
+        self.camera: tuple[CameraState, ...] = ()
         self.total: int | None = len(self._paths)
         self._times_s, self.times = _times(self._paths, fps or DEFAULT_FPS, fps is not None, times, name)
         steps_s = [b - a for a, b in zip(self._times_s, self._times_s[1:], strict=False) if b > a]
@@ -58,9 +59,27 @@ class ImagesSource:
     def frames(self) -> Iterator[SourceFrame]:
         for time_s, path in zip(self._times_s, self._paths, strict=True):
             try:
-                yield SourceFrame(time_s, read_image(path, self._most_pixels), path=path)
+                yield SourceFrame(time_s, self._read(path), path=path)
             except ImageFileError as error:
                 yield SourceFrame(time_s, None, str(error), path)
+
+    def _read(self, path: Path) -> Image:
+        """A picture; values of fewer bits than 16 are scaled by all pictures so far, so that light stays comparable."""
+        pixels = read_stored(path, self._how.max_pixels)
+        if pixels.dtype != np.uint16:
+            return pixels
+        place = range_of(pixels, path, self._how.bits, self._used)
+        self._used, self._bits = self._used | used_values(pixels), place.bits
+        return full_range(pixels, place)
+
+    @property
+    def notes(self) -> list[str]:
+        if self._bits == 16 or self._how.bits is not None:
+            return []
+        return [
+            f"the pictures hold values of {self._bits} bits in 16, which are scaled to the whole range; where all "
+            f"pictures are dark, state the camera's bits with {parameter('bits')}"
+        ]
 
 
 def _times(

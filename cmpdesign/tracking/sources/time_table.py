@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
+from cmpdesign.errors import SourceError
 from cmpdesign.inputs.files import read_text
-from cmpdesign.inputs.sources import SourceError
 
 _UNIX_S = 10**9  # larger times are seconds since 1970
 

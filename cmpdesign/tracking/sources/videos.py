@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from cmpdesign.errors import parameter
+from cmpdesign.errors import SourceError, parameter
 from cmpdesign.files.images import is_image_file
+from cmpdesign.inputs.cameras import CameraState
 from cmpdesign.inputs.files import MOST_PIXELS, is_regular_file, path_exists
-from cmpdesign.inputs.sources import SourceError
 from cmpdesign.inputs.videos import (
     VideoFacts,
     decoded_frames,
@@ -54,6 +54,8 @@ class VideoSource:
                 f"{paths[0]}: a video has no names of frames; use {parameter('times', 'index')}, or a file .csv"
             )
         self._paths, self._most_pixels = tuple(paths), most_pixels
+        self.notes: list[str] = []
+        self.camera: tuple[CameraState, ...] = ()
         facts, bare = [], False
         for path in self._paths:
             require_video_file(path)

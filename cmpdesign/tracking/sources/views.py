@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
+from cmpdesign.inputs.cameras import CameraState
 from cmpdesign.tracking.sources.frame_source import FrameSource, SourceFrame, SourceTimes
 
 _STEPS = 32  # the last steps of a source, whose median is its step
@@ -85,6 +86,14 @@ class MultiViewSource:
             first.origin,
             is_doubtful,
         )
+
+    @property
+    def notes(self) -> list[str]:
+        return list(dict.fromkeys(note for source in self._sources for note in source.notes))
+
+    @property
+    def camera(self) -> tuple[CameraState, ...]:
+        return tuple(state for source in self._sources for state in source.camera)
 
     def frames(self) -> Iterator[SourceFrame]:
         """Frames of all sources, with the first source's times; a missing image is None in the list."""

@@ -4,6 +4,7 @@
 #include "complete/image_quality.hpp"
 #include "complete/layer_arcs.hpp"
 #include "complete/repair.hpp"
+#include "complete/row_breaks.hpp"
 #include "complete/virtual_markers.hpp"
 
 namespace cmp::complete {
@@ -22,6 +23,7 @@ void add_complete(nb::module_ module) {
   bind<&places_by_layer>(module, "predict_by_layer", {"xy", "noise_px2", "layers", "limits"});
   bind<&repair_markers>(module, "repair_markers", {"refined", "places", "tables", "size", "limits"});
   bind<&locate_on_edges>(module, "locate_on_edges", {"markers", "scatter", "topology", "points", "limits"});
+  bind<&measure_jumps>(module, "measure_jumps", {"markers", "topology", "limits"});
   bind<&measure_cells>(module, "measure_cells", {"view", "center", "color", "edge_px", "limits"});
   bind<&measure_numbered>(module, "measure_numbered", {"view", "cells", "xy", "edges", "limits"});
 }

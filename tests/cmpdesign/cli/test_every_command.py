@@ -65,7 +65,7 @@ def test_a_dash_is_no_file(name: tuple[str, ...], tmp_path: Path, monkeypatch: p
         assert result.exit_code == 2 and "standard input and output are not supported" in result.stderr
         assert len(result.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
-    assert paths or name in {("templates",), ("schema",), ("check",), ("studio",)}
+    assert paths or name in {("templates",), ("schema",), ("check",), ("cameras",), ("studio",)}
 
 
 # -- Ctrl-C
@@ -87,6 +87,29 @@ def test_ctrl_c_is_one_line(name: tuple[str, ...], monkeypatch: pytest.MonkeyPat
     result = CliRunner().invoke(app, [*name, *words_for(COMMANDS[name])])
     assert result.exit_code == 130 and result.stdout == ""
     assert re.fullmatch(r"error: interrupted; .*\n", result.stderr)
+
+
+IMPORTING = """
+import builtins, sys
+from cmpdesign.__main__ import main
+left, usual = int(sys.argv.pop(1)), builtins.__import__
+def importing(*words, **options):
+    global left
+    left -= 1
+    if left == 0:
+        raise KeyboardInterrupt
+    return usual(*words, **options)
+builtins.__import__ = importing
+main()
+"""
+
+
+@pytest.mark.parametrize("imports", [1, 40, 400])
+def test_ctrl_c_while_the_program_loads_is_one_line(imports: int) -> None:
+    command = [sys.executable, "-c", IMPORTING, str(imports), "templates"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert re.fullmatch(r"error: interrupted; .*\n", done.stderr)
 
 
 def interrupted(folder: Path, *words: object, wait_s: float) -> tuple[int, str, float]:

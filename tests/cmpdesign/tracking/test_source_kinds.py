@@ -17,7 +17,7 @@ from PIL import Image as PillowImage
 from cmpdesign.data.videos.pieces import piece_frames, video_pieces
 from cmpdesign.files.images import read_image
 from cmpdesign.inputs.sources import name_sources
-from cmpdesign.tracking.sources import SourceError, open_named, open_source, open_sources
+from cmpdesign.tracking.sources import Reading, SourceError, open_named, open_source, open_sources
 from tests.support.command import refused, run
 from tests.support.made.videos import cut_jpeg, cut_without_encoding, turn_in_player, write_video
 from tests.support.tracking.files import loaded, write_moving_pattern
@@ -38,7 +38,7 @@ def images(made: Path) -> list[Any]:
 
 
 def times_of(source: Any, **options: Any) -> list[float]:
-    return [round(frame.time_s, 6) for frame in open_source(source, **options).frames()]
+    return [round(frame.time_s, 6) for frame in open_source(source, Reading(**options)).frames()]
 
 
 def shown(path: Path) -> list[Any]:
@@ -186,6 +186,28 @@ def test_fewer_bits_in_a_file_of_16(bits: int, at_top: bool, images: list[Any], 
     expected = wide.astype(np.float64) * 65535 / ((1 << int(wide.max()).bit_length()) - 1)
     expected = wide * (65535 / ((1 << bits) - 1)) if at_top else expected
     assert np.abs(found - expected).max() <= 1
+
+
+def test_bits_are_found_from_all_pictures_or_stated(made: Path, images: list[Any], tmp_path: Path) -> None:
+    """A dark picture alone looks like one of fewer bits; its light stays comparable to that of the others."""
+    for k, share in enumerate((1.0, 0.1)):
+        wide = (images[0].astype(np.float64) / 255 * share * 4095).round().astype(np.uint16)
+        wide[0, 0] = 4095 * share
+        cv2.imwrite(str(tmp_path / f"{k}.png"), wide)
+    source = open_source(str(tmp_path))
+    bright, dark = (frame.image for frame in source.frames())
+    assert np.median(bright / np.maximum(dark, 1)) == pytest.approx(10, rel=0.02)
+    assert "values of 12 bits in 16" in source.notes[0]
+    alone = next(iter(open_source(str(tmp_path / "1.png"), Reading(bits=12)).frames())).image
+    assert (alone == dark).all()
+    frame = next(iter(open_source(str(tmp_path / "0.png"), Reading(bits=10)).frames()))
+    assert frame.image is None and "have 12 bits, bits states 10" in frame.problem
+    result = run("track", made / "layout.json", tmp_path, "-o", tmp_path / "a.npz")
+    assert result.exit_code == 0 and result.stderr.count("values of 12 bits in 16") == 1
+    assert json.loads((tmp_path / "a.npz.summary.json").read_text())["notes"]
+    assert "--bits is 17; expected 8 to 16" in refused(
+        "track", made / "layout.json", tmp_path, "-o", tmp_path / "b.npz", "--bits", 17
+    )
 
 
 def test_a_folder_with_other_files(images: list[Any], tmp_path: Path) -> None:

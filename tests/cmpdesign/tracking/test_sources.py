@@ -84,7 +84,10 @@ class StoppingCamera:
     def get(self, key: int) -> float:
         if key == cv2.CAP_PROP_POS_MSEC:
             return self.stamps_ms.pop(0) if self.stamps_ms else 0.0  # as of a driver without stamps
-        return {cv2.CAP_PROP_FRAME_WIDTH: 320, cv2.CAP_PROP_FRAME_HEIGHT: 240}[key]
+        return {cv2.CAP_PROP_FRAME_WIDTH: 320, cv2.CAP_PROP_FRAME_HEIGHT: 240}.get(key, -1)
+
+    def getBackendName(self) -> str:
+        return "V4L2"
 
     def read(self) -> tuple[bool, Any]:
         return (True, cv2.imread(str(self.paths.pop(0)))) if self.paths else (False, None)

@@ -237,15 +237,18 @@ def test_wrong_texts(text: str, expected: str) -> None:
 def test_wrong_files(tmp_path: Path) -> None:
     binary = tmp_path / "binary.json"
     binary.write_bytes(b'{"format": "\xff\xfe"}')
+    picture = tmp_path / "picture.png"
+    picture.write_bytes(b"\x89PNG\r\n\x1a\n")
     loop = tmp_path / "loop.json"
     loop.symlink_to(loop)
     cases = {
         tmp_path / "none.json": "No such file",
-        tmp_path: "Is a directory",
+        tmp_path: "it is a folder; expected a layout, a text in UTF-8; it comes first, then the pictures",
         binary: "byte 12 is not UTF-8",
+        picture: "picture.png: is a PNG picture; expected a layout",
         loop: "cannot be read",
         tmp_path / "nul\0.json": "cannot be read",
-        Path("/dev/zero"): "a device; expected a regular file",
+        Path("/dev/zero"): "it is a device; expected a layout",
     }
     for path, expected in cases.items():
         with pytest.raises(LayoutError, match=expected) as caught:

@@ -41,6 +41,21 @@ def test_the_systematic_deviation_is_true() -> None:
     assert 0.7 < np.sqrt(np.mean(squares)) < 1.3
 
 
+def test_the_systematic_deviation_is_that_of_another_sensor() -> None:
+    """Linear in the difference, it is the difference of two readings of the same pictures."""
+    rng, medium, views = np.random.default_rng(2), Medium(4.0, 1.41, 2.0, 1.49), pair()
+    seen = tuple(replace(view, medium=medium) for view in views)
+    rest, now = ([noisy(LAYOUT, v, xyz, rng, 0.004) for v in seen] for xyz in (flat(LAYOUT), TRUE))
+    rig = replace(stated(medium), medium_deviation={"gel_index": 0.005})
+    shape = Reconstructor(LAYOUT, rig, rest).reconstruct(now)
+    other = Reconstructor(LAYOUT, stated(replace(medium, gel_index=1.415)), rest).reconstruct(now)
+    difference_mm = np.abs(other.displacement_mm - shape.displacement_mm)[:, 2]
+    pressed_far = np.flatnonzero(TRUE[:, 2] < -0.3)
+    np.testing.assert_allclose(
+        shape.displacement_systematic_mm[pressed_far, 2], difference_mm[pressed_far], rtol=0.1
+    )
+
+
 def test_an_exact_medium_has_no_systematic_deviation() -> None:
     rng = np.random.default_rng(1)
     views = pair()

@@ -1,5 +1,7 @@
 """SVG for laser programs: the page is the bed, 1 user unit is 1 mm, one group per pass, closed paths without fill.
 
+The color stands on the group and on every path: simple programs (K40 Whisperer) read it from the paths only.
+
 Coordinates are final (no transform), so every program puts every pass at the same place.
 """
 
@@ -24,7 +26,7 @@ def drawing_to_svg(drawing: LaserDrawing) -> str:
     for laser_pass in drawing.passes:
         stroke = hex_color(drawing.laser_layers[laser_pass.name])
         lines.append(f'<g id="{laser_pass.name}" fill="none" stroke="{stroke}" stroke-width="0.05">')
-        lines += [f'<path d="{data}"/>' for data in path_data(laser_pass.walls, height)]
+        lines += [f'<path stroke="{stroke}" d="{data}"/>' for data in path_data(laser_pass.walls, height)]
         lines.append("</g>")
     return "\n".join([*lines, "</svg>", ""])
 

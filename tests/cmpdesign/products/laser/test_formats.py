@@ -77,6 +77,15 @@ def test_svg_colors_are_lightburns() -> None:
     assert dict(re.findall(r'<g id="([^"]+)" fill="none" stroke="#([0-9A-F]{6})"', text)) == colors
 
 
+def test_every_path_of_an_svg_has_its_color() -> None:
+    """As K40 Whisperer reads it: the color of each path, not that of its group."""
+    job, drawing = drawn(0)
+    root = ElementTree.fromstring(drawing_to_svg(drawing))
+    for one in job.passes:
+        (group,) = root.iterfind(f"{SVG}g[@id='{one.name}']")
+        assert len(group) and {path.get("stroke") for path in group} == {group.get("stroke")}
+
+
 @pytest.mark.parametrize("case", range(len(CASES)))
 def test_dxf(case: int) -> None:
     job, drawing = drawn(case)

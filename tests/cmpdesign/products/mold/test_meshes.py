@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import io
 import re
+import shutil
+import subprocess
+import zipfile
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -84,17 +87,38 @@ def test_glb_is_in_metres_and_named(made: ProductFiles) -> None:
     assert height == pytest.approx(0.005, rel=1e-6)
 
 
-def test_3mf_has_one_object_a_color_and_no_complaint_in_strict_mode(made: ProductFiles) -> None:
-    names = [name for name, _, _ in read_3mf(content(made, "pad.3mf"))]
+def test_a_pad_as_3mf_is_one_object_and_a_mold_one_for_each_part(made: ProductFiles) -> None:
+    """A slicer would put several objects beside each other, each on the plate."""
+    (pad,) = read_3mf(content(made, "pad.3mf"))
+    assert pad.materials == ["base", "black", "red", "green", "blue", "white", "cover"]
+    assert (pad.high_mm - pad.low_mm)[2] == pytest.approx(5.0, abs=1e-5)
+    mold = read_3mf(content(made, "mold.3mf"))
+    assert len(mold) == 13 and {len(part.materials) for part in mold} == {1}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="needs PrusaSlicer")
+def test_a_slicer_keeps_the_pad_in_one_piece(made: ProductFiles, tmp_path: Path) -> None:
+    """PrusaSlicer's own measure of the one object that it would slice, and the parts that it knows of it."""
+    (tmp_path / "pad.3mf").write_bytes(content(made, "pad.3mf"))
+    command = ["prusa-slicer", "--info", str(tmp_path / "pad.3mf")]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    (height_mm,) = re.findall(r"size_z = ([\d.]+)", told)
+    assert float(height_mm) == pytest.approx(5.0, abs=1e-3)
+    command = ["prusa-slicer", "--export-3mf", "-o", str(tmp_path / "again.3mf"), str(tmp_path / "pad.3mf")]
+    subprocess.run(command, capture_output=True, check=True)
+    with zipfile.ZipFile(tmp_path / "again.3mf") as again:
+        parts = again.read("Metadata/Slic3r_PE_model.config").decode()
+    names = re.findall(r'type="volume" key="name" value="(\w+)"', parts)
     assert names == ["base", "black", "red", "green", "blue", "white", "cover"]
-    assert len(read_3mf(content(made, "mold.3mf"))) == 13
+    assert re.findall(r'key="extruder" value="(\d)"', parts) == list("1234567")
 
 
 def test_an_open_mesh_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     points = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1.0)])
     tent = TriangleMesh("tent", "#ff0000", points, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3)]))
     with pytest.raises(RuntimeError, match="tent: the mesh is not closed"):
-        meshes_to_3mf([tent], "tent")
+        meshes_to_3mf([tent], "tent", is_one_piece=True)
     monkeypatch.setattr(product, "pad_meshes", lambda stack: [(tent, tent.volume_mm3())])
     design = load("honeycomb", {"layers": "1"})
     with pytest.raises(MoldError, match="tent: watertight False"):

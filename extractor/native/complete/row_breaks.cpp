@@ -1,0 +1,99 @@
+#include "complete/row_breaks.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace cmp::complete {
+
+namespace {
+
+constexpr std::uint8_t MEASURED = 1;  // Status in extractor/result.py
+
+using Vector = std::array<double, 2>;
+
+// Four markers in a row: the edge in the middle, its middle and vector, and the jump there, px.
+struct Gridline {
+  Index edge;
+  Vector middle, rise, jump;
+};
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return values.size() % 2 ? *middle : (*middle + *std::max_element(values.begin(), middle)) / 2;
+}
+
+// The gridlines of four measured markers, and the lengths of all measured edges; a jump is a third of the
+// third difference.
+std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::Topology& topology,
+                                   double most_of_layout, std::vector<double>& lengths) {
+  const auto is_measured = [&](Index m) { return m >= 0 && markers.status[m] == MEASURED; };
+  std::vector<Gridline> found;
+  double uu = 0, uv = 0, vv = 0;
+  Vector by_u{}, by_v{};
+  for (Index e = 0; e < topology.edges.size(); ++e) {
+    const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
+    if (!is_measured(a) || !is_measured(b)) continue;
+    Gridline line{e, {}, {}, {}};
+    for (int k = 0; k < 2; ++k) line.rise[k] = markers.xy_px(b, k) - markers.xy_px(a, k);
+    lengths.push_back(std::hypot(line.rise[0], line.rise[1]));
+    const Index before = topology.next_markers(e, 0), after = topology.next_markers(e, 1);
+    const double own = std::hypot(topology.third_differences(e, 0), topology.third_differences(e, 1));
+    if (!is_measured(before) || !is_measured(after) || own >= 3 * most_of_layout) continue;
+    const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
+    uu += u * u, uv += u * v, vv += v * v;
+    for (int k = 0; k < 2; ++k) {
+      line.middle[k] = (markers.xy_px(a, k) + markers.xy_px(b, k)) / 2;
+      line.jump[k] = line.rise[k] - (markers.xy_px(after, k) - markers.xy_px(before, k)) / 3;
+      by_u[k] += u * line.rise[k], by_v[k] += v * line.rise[k];
+    }
+    found.push_back(line);
+  }
+  // Round and elliptical layouts have third differences themselves. These are mapped to the image, and taken
+  // off.
+  const double determinant = uu * vv - uv * uv;
+  if (determinant <= 1e-9 * uu * vv) return found;
+  for (Gridline& line : found) {
+    const double u = topology.third_differences(line.edge, 0), v = topology.third_differences(line.edge, 1);
+    for (int k = 0; k < 2; ++k)
+      line.jump[k] -=
+          (u * (vv * by_u[k] - uv * by_v[k]) + v * (uu * by_v[k] - uv * by_u[k])) / (3 * determinant);
+  }
+  return found;
+}
+
+// The length of the median jump of each strip along an axis, the later row or column less the earlier one.
+Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, double edge,
+                             const JumpLimits& limits) {
+  std::vector<std::array<std::vector<double>, 2>> strips;
+  for (const Gridline& line : lines) {
+    const double rise = line.rise[axis];
+    if (std::abs(rise) <= limits.min_rise * edge || line.middle[axis] < 0) continue;
+    const auto strip = static_cast<std::size_t>(line.middle[axis] / (limits.bin * edge));
+    if (strip >= strips.size()) strips.resize(strip + 1);
+    for (int k = 0; k < 2; ++k)
+      strips[strip][k].push_back(std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge));
+  }
+  Array<double, 1> jump({static_cast<Index>(strips.size())}, 0.0);
+  for (Index s = 0; s < jump.size(); ++s) {
+    auto& [x, y] = strips[s];
+    if (static_cast<Index>(x.size()) >= limits.min_gridlines) jump[s] = std::hypot(median(x), median(y));
+  }
+  return jump;
+}
+
+}  // namespace
+
+StripJumps measure_jumps(const LocatedMarkers& markers, const layout::Topology& topology,
+                         const JumpLimits& limits) {
+  std::vector<double> lengths;
+  const auto lines = gridlines_of(markers, topology, limits.most_of_layout, lengths);
+  if (static_cast<Index>(lengths.size()) < limits.min_gridlines)
+    return {0.0, Array<double, 1>({0}), Array<double, 1>({0})};
+  const double edge = median(lengths);
+  return {edge, jumps_along(lines, 1, edge, limits), jumps_along(lines, 0, edge, limits)};
+}
+
+}  // namespace cmp::complete
