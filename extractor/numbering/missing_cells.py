@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from extractor._native import numbering as native
 from extractor.layout.lattice_tables import Lattice
-from extractor.numbering.registration import ATTACHMENT, MapPrior, Numbering
+from extractor.numbering.registration import Numbering
+from extractor.numbering.witnesses import ATTACHMENT, MapPrior
 
 
 class MissingCellLimits(NamedTuple):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.pad_codes import (
+from benchmarks.pad_codes.parts import (
     NO_BRIGHT_PLACES,
+    STEPS_BESIDE,
     Pad,
     down_cells_of,
     is_right,
@@ -15,7 +16,6 @@ from benchmarks.pad_codes import (
     random_motion,
     seen_part,
 )
-from extractor.numbering.code_bits import STEPS_BESIDE
 
 RADIUS = 5  # of the windows that the codes of 7 to 10 layers tell apart
 

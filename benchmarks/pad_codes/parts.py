@@ -19,7 +19,8 @@ from extractor.layout.lattice_tables import Lattice, lattice_of
 from extractor.numbering.code_bits import STEPS_BESIDE
 from extractor.numbering.ink_fields import LIMITS, InkFields, Palette
 from extractor.numbering.lattice_walk import WalkedCells
-from extractor.numbering.registration import BrightPlaces, PlacedPart, Registration, SeenPart
+from extractor.numbering.registration import PlacedPart, Registration, SeenPart
+from extractor.numbering.witnesses import BrightPlaces
 
 CODES = 16
 NAMING_LEAD = 20.0  # log odds of the right naming; the inks are seen
@@ -175,7 +176,3 @@ def main() -> None:
         print(
             f"{group:35} {found.total():8} right {found['right'] / found.total():7.2%}  wrong {found['wrong']}"
         )
-
-
-if __name__ == "__main__":
-    main()
