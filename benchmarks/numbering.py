@@ -1,9 +1,9 @@
-"""Two methods of numbering the same cells: the article's graph of corners, and the extractor's cell mesh.
+"""Two methods of numbering the cells of the same images: the article's, and the extractor's.
 
     python -m benchmarks.numbering
 
-Both methods start from the triangles or centres of the same images. A cell is right if it gets the layout's number, and
-wrong if it gets another number.
+The article finds cells by hue and AGA, and numbers a graph of corners. The extractor finds cells by contrast, and
+registers the parts of a mesh of cells. A cell is right if it gets the layout's number, and wrong if it gets another.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.suites.article.corners import fit_plain_triangles
 from benchmarks.suites.article.graph import connect_corners
 from benchmarks.suites.article.numbering import make_lattice_tables as article_lattice
 from benchmarks.suites.article.numbering import number_triangles as article_number
+from benchmarks.suites.article.regions import grow_from_hues
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import (
     Camera,
@@ -101,7 +103,7 @@ class CellCount:
 
 def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount]:
     """The counts of the article's method and of the extractor on the same images."""
-    article, cell_mesh = CellCount(), CellCount()
+    article, registered = CellCount(), CellCount()
     inks = standard_scene().inks
     for pattern in PATTERNS:
         layout = standard_layout(pattern, LAYERS)
@@ -121,28 +123,27 @@ def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount
             )
             rendered = render(scene)
             image, truth = np.asarray(rendered.image, np.uint8), rendered.truth
-            stages = extractor.extract(image).stages
-            triangles = stages["triangles"]
+            view = extractor.pyramid(np.ascontiguousarray(image), image.dtype).level(1)
+            triangles = fit_plain_triangles(grow_from_hues(view, dict(reference.palette)))
             numbering = article_number(image, triangles, connect_corners(triangles), lattice)
             found = np.full(len(triangles.ink), -1) if numbering is None else numbering.cell_of_triangle
             article.add(found, triangles.corner_px.mean(axis=1), reference, truth)
-            attached = stages.get("attach")
-            if attached is None:
-                cell_mesh.visible += int((truth.cell_visible & (reference.cell_color < 3)).sum())
-                continue
-            numbered = np.where(attached.cell >= 0, colored[attached.cell], -1)
-            cell_mesh.add(numbered, stages["cells"].center_px, reference, truth)
-    return article, cell_mesh
+            numbered = extractor.extract(image).stages.get("triangles")
+            cells, center_px = (np.zeros(0, np.int32), np.zeros((0, 2)))
+            if numbered is not None:
+                cells, center_px = colored[numbered.cell], numbered.center_px
+            registered.add(cells, center_px, reference, truth)
+    return article, registered
 
 
 def main() -> None:
     table = Table(title=f"cells numbered, {len(PATTERNS)} patterns x {len(SEEDS)} images, {LAYERS} layers")
-    for name in ("condition", "visible", "corners: right", "wrong", "centers: right", "wrong"):
+    for name in ("condition", "visible", "article: right", "wrong", "registered: right", "wrong"):
         table.add_column(name, justify="left" if name == "condition" else "right")
     for condition in CONDITIONS:
-        article, cell_mesh = compare_methods(condition)
+        article, registered = compare_methods(condition)
         row = [f"{article.visible}"]
-        for count in (article, cell_mesh):
+        for count in (article, registered):
             row += [f"{100 * count.right / count.visible:.2f} %", f"{count.wrong}"]
         table.add_row(condition.name, *row)
     Console(width=110).print(table)

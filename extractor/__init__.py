@@ -6,12 +6,12 @@
 The rooms (folders and modules) in their order; a room imports only rooms before it, and the small modules ``errors``,
 ``quality``, ``result`` and ``presets``:
 
-- ``numeric``: sampling of images, nearest points, triangulation, homographies.
+- ``numeric``: sampling of images, nearest points, homographies.
 - ``layout``: ``layout.json`` and the tables of a layout.
-- ``image``: stages 1 and 2, from pixels to inks.
-- ``cells``: stages 3 to 6, from inks to triangles, cells and their mesh.
+- ``image``: the image as BGR, at several scales, and its light.
+- ``cells``: from pixels to cells by contrast, grown by AGA, and their mesh.
 - ``localmap``: local maps from layout to image.
-- ``numbering``: stage 7, from cells to numbered markers.
+- ``numbering``: from cells to numbered markers, by the walk (SSA) and registration.
 - ``refine``: all markers solved together, by profiles and synthesis.
 - ``complete``: repair of lost markers, and virtual markers.
 - ``pipeline``: the stages in their order, from an image to markers. ``draw`` shows their results.

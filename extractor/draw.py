@@ -10,31 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.image.input import convert_to_bgr, in_native_order
+from extractor.layout.lattice_tables import lattice_of
 from extractor.layout.reference import Reference
 from extractor.result import Markers, Status
 
 if TYPE_CHECKING:
     from extractor.cells.cell_mesh import CellMesh
     from extractor.cells.cells import Cells
-    from extractor.cells.region_growing import Regions
-    from extractor.cells.seeds import Seeds
-    from extractor.cells.triangle_fit import Triangles
-    from extractor.image.ink_segmentation import Segmentation
-    from extractor.image.target_area import Target
+    from extractor.numbering.lattice_walk import Walk
+    from extractor.numbering.missing_cells import NumberedTriangles
 
 Picture = NDArray[np.uint8]
 
 SHORT_SIDE_PX = 1000  # smaller images are enlarged to about this side, so that ids are legible
 ID_EDGE_PX = 30  # length of the edges from which ids are drawn
 SHIFT = 4  # fractional bits of OpenCV's drawing coordinates
-# of no ink, red, green and blue
-INK_BGR = np.array([[40, 40, 40], [60, 60, 230], [80, 190, 60], [230, 110, 60]], np.uint8)
+INK_BGR = ((120, 120, 255), (140, 250, 120), (255, 170, 120))  # red, green and blue
+CLASS_BGR = ((255, 220, 60), (255, 90, 220), (60, 220, 255))  # of (q - r) mod 3, before inks have names
 STATUS_BGR = {
     Status.MEASURED: (80, 255, 255),
     Status.REPAIRED: (0, 160, 255),
     Status.FITTED: (255, 120, 255),
 }
 WHITE_BGR = (255, 255, 255)
+GRAY_BGR = (150, 150, 150)
 CAPTION_BGR = (25, 25, 25)
 
 
@@ -91,19 +90,17 @@ def draw_stages(image: NDArray[Any], reference: Reference, markers: Markers) -> 
     scale = _enlargement(base)
     results = markers.stages
     pictures: dict[str, Picture] = {}
-    if results.get("target") is not None:
-        pictures["target"] = _draw_target(base, scale, results["target"])
-    if results.get("segment") is not None:
-        pictures["segment"] = _resized_to_picture(INK_BGR[results["segment"].label], base, scale)
-    if "seeds" in results:
-        pictures["seeds"] = _draw_seeds(base, scale, results["segment"], results["seeds"])
-    if "grow" in results:
-        pictures["grow"] = _draw_regions(base, scale, results["grow"])
-    if "triangles" in results:
-        pictures["triangles"] = _draw_triangles(base, scale, results["triangles"])
-    if results.get("mesh") is not None:
-        pictures["mesh"] = _draw_mesh(base, scale, results["cells"], results["mesh"])
+    if "walk" in results:
+        pictures["seeds"] = _draw_cells(base, scale, results["seeds"])
+        cells = results["seeds"]
+        # growing may have been tried at another scale than that of the walk
+        if "grow" in results and len(results["grow"].area_px) == len(cells.area_px):
+            cells = results["grow"]
+            pictures["grow"] = _draw_cells(base, scale, cells)
+        pictures["mesh"] = _draw_mesh(base, scale, cells, results["mesh"])
+        pictures["walk"] = _draw_walk(base, scale, cells, results["walk"])
     if "place" in results:
+        pictures["triangles"] = _draw_triangles(base, scale, reference, results["triangles"])
         pictures["number"] = _draw_spiral(base, scale, reference, results["place"].xy_px)
         pictures["markers"] = draw_markers(image, reference, markers)
     return pictures
@@ -126,11 +123,6 @@ def _enlarged(base: Picture, scale: int, brightness: float) -> Picture:
     height, width = base.shape[:2]
     large = cv2.resize(base, (width * scale, height * scale), interpolation=cv2.INTER_NEAREST)
     return cv2.convertScaleAbs(large, alpha=brightness)  # type: ignore[return-value]
-
-
-def _resized_to_picture(picture: Picture, base: Picture, scale: int) -> Picture:
-    size = (base.shape[1] * scale, base.shape[0] * scale)
-    return cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)  # type: ignore[return-value]
 
 
 def _picture_coordinates(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
@@ -237,56 +229,49 @@ def _draw_sample(canvas: Picture, x: float, y: float, radius: float, part: Capti
         _draw_dot(canvas, x, y, radius, part.color, 2 if part.sample == "ring" else -1)
 
 
-def _draw_target(base: Picture, scale: int, target: Target) -> Picture:
-    height, width = base.shape[:2]
-    tile_px = target.tile_px
-    large = cv2.resize(target.mask, None, fx=tile_px, fy=tile_px, interpolation=cv2.INTER_NEAREST)
-    mask = cv2.resize(large, (width, height), interpolation=cv2.INTER_NEAREST)
-    return _enlarged(np.where(mask[..., None] > 0, base, base // 4).astype(np.uint8), scale, 1.0)
-
-
-def _draw_seeds(base: Picture, scale: int, segmentation: Segmentation, seeds: Seeds) -> Picture:
-    canvas = _resized_to_picture((INK_BGR[segmentation.label] // 2).astype(np.uint8), base, scale)
-    total_scale = _level_scale(base, scale, segmentation.label)
-    for x, y in _picture_coordinates(seeds.xy.astype(np.float64), total_scale):
-        _draw_dot(canvas, x, y, 4.0, WHITE_BGR)
-    return canvas
-
-
-def _draw_regions(base: Picture, scale: int, regions: Regions) -> Picture:
-    ink = np.concatenate([[0], regions.ink]).astype(np.uint8)
-    return _resized_to_picture(INK_BGR[ink[regions.region_map]], base, scale)
-
-
-def _level_scale(base: Picture, scale: int, level: NDArray[Any]) -> float:
-    """Pixels of the enlarged picture for one pixel of the level in which the seeds were found."""
-    return float(scale * round(base.shape[1] / level.shape[1]))
-
-
-def _bright_color(ink: int) -> tuple[int, int, int]:
-    blue, green, red = (min(int(level) + 60, 255) for level in INK_BGR[ink])
-    return blue, green, red
-
-
-def _draw_triangles(base: Picture, scale: int, triangles: Triangles) -> Picture:
+def _draw_cells(base: Picture, scale: int, cells: Cells) -> Picture:
+    """The triangles of the regions that may be cells."""
     canvas = _enlarged(base, scale, 0.4)
-    for ink in (1, 2, 3):
-        corners = _picture_coordinates(triangles.corner_px[triangles.ink == ink], scale)
-        _draw_lines(canvas, corners, _bright_color(ink), 2)
+    _draw_lines(canvas, _picture_coordinates(cells.corner_px, scale), WHITE_BGR)
     return canvas
 
 
 def _draw_mesh(base: Picture, scale: int, cells: Cells, mesh: CellMesh) -> Picture:
-    """The faces between three centers, which are markers or black cells; faces that turn clockwise are yellow."""
+    """The links between the centers of cells; cells without a link are gray dots."""
     canvas = _enlarged(base, scale, 0.4)
     centers = _picture_coordinates(cells.center_px, scale)
-    for turn, color in ((-1, (150, 150, 150)), (1, (80, 255, 255))):
-        corners = centers[mesh.faces[mesh.orientation == turn]]
-        middle = corners.mean(axis=1, keepdims=True)
-        _draw_lines(canvas, middle + 0.8 * (corners - middle), color)
-    for ink in (1, 2, 3):
-        for x, y in centers[cells.ink == ink]:
-            _draw_dot(canvas, x, y, 4.0, _bright_color(ink))
+    one, step = np.nonzero(mesh.links.neighbours >= 0)
+    other = mesh.links.neighbours[one, step]
+    _draw_lines(canvas, np.stack([centers[one], centers[other]], axis=1), STATUS_BGR[Status.MEASURED])
+    for (x, y), is_linked in zip(centers, mesh.is_linked, strict=True):
+        _draw_dot(canvas, x, y, 4.0, WHITE_BGR if is_linked else GRAY_BGR)
+    return canvas
+
+
+def _draw_walk(base: Picture, scale: int, cells: Cells, walk: Walk) -> Picture:
+    """The cells with the color of their class; those of the largest part are filled."""
+    canvas = _enlarged(base, scale, 0.4)
+    corners = _picture_coordinates(cells.corner_px, scale)
+    _draw_lines(canvas, corners[walk.part < 0], GRAY_BGR)
+    largest = int(walk.sizes.argmax()) if len(walk.sizes) else -1
+    kind = (walk.axial[:, 0] - walk.axial[:, 1]) % 3
+    for number, color in enumerate(CLASS_BGR):
+        own = (kind == number) & (walk.part >= 0)
+        _draw_lines(canvas, corners[own], color, 2)
+        filled = np.round(corners[own & (walk.part == largest)] * (1 << SHIFT)).astype(np.int32)
+        for corner in filled:
+            cv2.fillConvexPoly(canvas, corner, color, cv2.LINE_AA, SHIFT)
+    return canvas
+
+
+def _draw_triangles(base: Picture, scale: int, reference: Reference, triangles: NumberedTriangles) -> Picture:
+    """The measured triangles with the color of their ink."""
+    canvas = _enlarged(base, scale, 0.4)
+    is_measured = np.isfinite(triangles.corner_px[:, 0, 0])
+    ink = lattice_of(reference).ink[triangles.cell]
+    for number, color in enumerate(INK_BGR):
+        corners = triangles.corner_px[is_measured & (ink == number + 1)]
+        _draw_lines(canvas, _picture_coordinates(corners, scale), color, 2)
     return canvas
 
 

@@ -1,24 +1,24 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
-Stages: image, light, color, target, segment, seeds, grow, triangles, cells, mesh, number, attach, place, refine,
-repair, virtual, quality. A warm start of the tracker goes from image over predict and prove to refine.
+Stages: image, seeds, grow, mesh, light, walk, number, triangles, place, refine, repair, virtual, quality. A warm
+start of the tracker goes from image over predict and prove to refine.
 """
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.cells.cell_mesh import build_cell_mesh
-from extractor.cells.cells import Cells, cells_with_triangles, find_cells
+from extractor.cells.cell_mesh import CellMesh, build_cell_mesh
+from extractor.cells.cells import EFFORTS, Cells, Effort, find_cells, has_color
 from extractor.cells.region_growing import grow
-from extractor.cells.seeds import NO_DOMAIN_LIMIT, Seeds, find_seeds
-from extractor.cells.triangle_fit import fit_triangles, triangles_from_moments
+from extractor.cells.triangle_fit import fit_edges, regions_as_cells, without_swelling
 from extractor.complete.image_quality import (
     measure_quality,
     measure_quality_without_numbers,
@@ -29,22 +29,18 @@ from extractor.complete.reported_share import is_less_than_half_reported
 from extractor.complete.row_breaks import beside_row_break, find_row_break
 from extractor.complete.virtual_markers import locate_virtual_markers
 from extractor.errors import LayoutError
-from extractor.image.color import nominal_hues_deg, to_colors
-from extractor.image.grey_card import GreyCard, find_grey_card, remove_light_color
-from extractor.image.ink_segmentation import segment
 from extractor.image.input import Channels, convert_to_bgr
-from extractor.image.pyramid import Pyramid
+from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response, light_of_values, response_tables
-from extractor.image.target_area import find_target
 from extractor.layout.lattice_tables import lattice_of
 from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import Reference
 from extractor.layout.topology import topology_of
-from extractor.numbering.gaps.detached_cells import number_detached_cells
-from extractor.numbering.lattice_walk import Numbering, number_cells
+from extractor.numbering.ink_fields import Palette
+from extractor.numbering.lattice_walk import Walk, cell_light, count_holes, walk_cells
 from extractor.numbering.marker_places import InitialMarkers, merge_corners
-from extractor.numbering.other_side import other_side_reason
-from extractor.numbering.small_pattern import fit_predicted_triangles, is_small_pattern_possible
+from extractor.numbering.missing_cells import with_missing_cells
+from extractor.numbering.registration import Numbering, Refusal, Registration
 from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
@@ -52,9 +48,11 @@ from extractor.refine.refiner import Refiner
 from extractor.result import Markers, Origin, Reason
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
-MAX_DOMAINS_PER_CELL = 3  # number of domains per cell of the pattern above which an image is cluttered,
-MIN_DOMAIN_LIMIT = 1000  # and at least this number of domains; both chosen
-MIN_FACES = 4  # markers and black cells between three inks, below which there is no pattern; chosen
+MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
+EQUILATERAL_AREA = math.sqrt(3.0) / 4.0  # over the square of the side
+MAX_HOLE_SHARE = 0.02  # of a lattice that is not looked at more closely; chosen
+MIN_GAIN = 1.1  # in linked cells, of a look that is followed by a closer one; chosen, for time
+MIN_HOLES = 5  # the same as a number: the white cell may hide its three neighbours. Chosen
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]
@@ -62,18 +60,56 @@ SIDES: tuple[Side, ...] = ("designed", "front", "back", "either")
 CHANNELS: tuple[Channels, ...] = ("bgr", "rgb")
 
 
+class FoundCells(NamedTuple):
+    """The cells of an image, their links, light, and places in the lattice."""
+
+    cells: Cells
+    mesh: CellMesh
+    light: NDArray[np.float64]
+    walk: Walk
+
+    @property
+    def linked(self) -> int:
+        """The number of linked cells."""
+        return int(np.count_nonzero(self.walk.part >= 0))
+
+    def is_small(self, view: PyramidLevel) -> bool:
+        """Whether the linked cells are too small for this reduced scale; also without any."""
+        areas = self.cells.area_px[self.walk.part >= 0]
+        least = EQUILATERAL_AREA * (MIN_LEVEL_EDGE_PX * view.scale) ** 2
+        return view.scale > 1 and (len(areas) == 0 or float(np.median(areas)) < least)
+
+
 class NumberedCells(NamedTuple):
     """The cells of an image with their numbers."""
 
-    cells: Cells
+    found: FoundCells
     numbering: Numbering
 
 
 class Unnumbered(NamedTuple):
     """The reason why no cell is numbered, and the cells that were found, if any."""
 
-    reason: Reason
-    cells: Cells | None = None
+    refusal: Refusal
+    found: FoundCells | None = None
+
+    @property
+    def weight(self) -> tuple[bool, bool, int]:
+        """What orders reasons: that of a pattern first, then a second white cell, then that of most cells."""
+        reason = self.refusal.reason
+        return (
+            reason != Reason.NO_PATTERN,
+            reason == Reason.SEVERAL_PADS,
+            self.found.linked if self.found else 0,
+        )
+
+    @property
+    def edge_px(self) -> float:
+        """The median side of the linked cells; NaN without a pattern."""
+        if self.found is None or self.refusal.reason == Reason.NO_PATTERN:
+            return math.nan
+        areas = self.found.cells.area_px[self.found.walk.part >= 0]
+        return math.sqrt(float(np.median(areas)) * 4.0 / math.sqrt(3.0)) / self.found.mesh.swelling
 
 
 class NumberedMarkers(NamedTuple):
@@ -117,6 +153,10 @@ class Stages:
         self.results[name] = result
         self._last = now
         return result
+
+    def keep(self, found: FoundCells) -> None:
+        """Keep the results of the look that was numbered, not of the last one."""
+        self.results |= {"seeds": found.cells, "mesh": found.mesh, "light": found.light, "walk": found.walk}
 
 
 class Extractor:
@@ -172,9 +212,8 @@ class Extractor:
         }
         self._lattice = lattice_of(layout)
         self._topology = topology_of(layout)
-        self._domain_limit = max(MAX_DOMAINS_PER_CELL * len(self._lattice.ink), MIN_DOMAIN_LIMIT)
         self._refiner = Refiner(self._topology, preset, layout.virtual_per_edge)
-        self._nominal_hues_deg = nominal_hues_deg(dict(layout.palette))
+        self._registration = Registration(self._lattice, Palette(dict(layout.palette)), self._mirrored)
         self._sampled_cells = sampled_cells(layout)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -203,12 +242,15 @@ class Extractor:
         pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Unnumbered):
-            has_pattern = found.reason not in (Reason.NO_COLOR, Reason.NO_PATTERN)
-            quality = measure_quality_without_numbers(pyramid.level(1), found.cells, has_pattern)
+            quality = measure_quality_without_numbers(pyramid.level(1), found.edge_px)
             stages.record("quality", quality)
-            return ReadImage(no_markers(self.layout, found.reason, stages, quality), None)
-        cells, numbering = found.cells, found.numbering
-        places = stages.record("place", merge_corners(cells, numbering, self._lattice))
+            return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
+        (cells, mesh, _, _), numbering = found
+        expected = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
+        triangles = stages.record(
+            "triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px))
+        )
+        places = stages.record("place", merge_corners(triangles, self._lattice))
         return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
 
     def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:
@@ -258,73 +300,57 @@ class Extractor:
         return ReadImage(markers, refined.appearance)
 
     def _number_cells(self, pyramid: Pyramid, stages: Stages) -> NumberedCells | Unnumbered:
-        """Stages 1 to 7 at the coarsest scale that numbers cells; else the reason at the finest scale."""
-        failed = Unnumbered(Reason.NO_COLOR)
+        """Stages 2 to 7 at the coarsest scale that numbers cells; else the reason where most cells were found."""
         scales = _recognition_scales(pyramid.size)
-        card = stages.record("light", find_grey_card(pyramid.level(scales[0]).image, scales[0]))
+        failed = Unnumbered(Refusal(Reason.NO_PATTERN))
         for scale in scales:
-            found = self._number_cells_at(pyramid, card, scale, stages)
-            if not isinstance(found, Unnumbered):
-                return found
-            failed = found
-        return failed
+            view = pyramid.level(scale)
+            for found in self._looks(view, stages):
+                numbering = stages.record("number", self._registration.number(view, *found))
+                if not isinstance(numbering, Refusal):
+                    stages.keep(found)
+                    return NumberedCells(found, numbering)
+                failed = max(failed, Unnumbered(numbering, found), key=lambda one: one.weight)
+        is_gray = not has_color(pyramid.level(scales[0]).image)
+        return Unnumbered(Refusal(Reason.NO_COLOR)) if is_gray else failed
 
-    def _number_cells_at(
-        self, pyramid: Pyramid, card: GreyCard, scale: int, stages: Stages
-    ) -> NumberedCells | Unnumbered:
-        """Stages 1 to 7 at 1/``scale`` of the full scale, or the reason why no cells are numbered."""
-        colors = stages.record(
-            "color", to_colors(remove_light_color(pyramid.level(scale).image, card, scale))
-        )
-        target = stages.record("target", find_target(colors))
-        segmentation = stages.record("segment", segment(colors, target, self._nominal_hues_deg))
-        if segmentation is None:
-            return Unnumbered(Reason.NO_COLOR)
-        # at a reduced scale all domains are kept, because a finer scale may resolve clutter
-        limit = self._domain_limit if scale == 1 else NO_DOMAIN_LIMIT
-        seeds = stages.record("seeds", find_seeds(segmentation, limit))
-        if scale > 1 and not seeds.has_large_domains:
-            return self._number_by_centers(pyramid, seeds, scale, stages) or Unnumbered(Reason.NO_COLOR)
-        regions = stages.record("grow", grow(segmentation, seeds))
-        triangles = stages.record("triangles", fit_triangles(pyramid.level(1), regions, scale))
-        cells = stages.record("cells", find_cells(seeds, triangles, scale))
-        return self._number_found_cells(pyramid, cells, stages)
+    def _looks(self, view: PyramidLevel, stages: Stages) -> Iterator[FoundCells]:
+        """The cells at one scale with more and more effort: first the looks in which all seem to be found, or that gain
+        little, then the others, the last one first. Looks with too small cells are left out."""
+        skipped: list[FoundCells] = []
+        before: FoundCells | None = None
+        for effort in EFFORTS:
+            found = self._find_cells(view, before.cells if before else None, effort, stages)
+            gains = before is None or found.linked >= MIN_GAIN * before.linked
+            before = found
+            if found.is_small(view):
+                continue
+            if gains and effort is not EFFORTS[-1] and not self._is_whole(found):
+                skipped.append(found)
+            else:
+                yield found
+        yield from reversed(skipped)
 
-    def _number_by_centers(
-        self, pyramid: Pyramid, seeds: Seeds, scale: int, stages: Stages
-    ) -> NumberedCells | None:
-        """The whole pattern numbered by the centers of its cells, where these are too small at this scale to grow."""
-        if not is_small_pattern_possible(seeds, len(self._lattice.ink)):
-            return None
-        coarse = stages.record("triangles", triangles_from_moments(seeds, scale))
-        cells = stages.record("cells", find_cells(seeds, coarse, scale))
-        found = self._number_found_cells(pyramid, cells, stages)
-        if isinstance(found, Unnumbered):
-            return None
-        triangles = fit_predicted_triangles(pyramid.level(1), cells, found.numbering, self._lattice)
-        if triangles is None:
-            return None
-        stages.record("triangles", triangles)
-        return NumberedCells(stages.record("cells", cells_with_triangles(cells, triangles)), found.numbering)
-
-    def _number_found_cells(
-        self, pyramid: Pyramid, cells: Cells, stages: Stages
-    ) -> NumberedCells | Unnumbered:
-        """Stages 6 and 7: the cells' mesh and numbers, or the reason why there are none."""
-        bgr = pyramid.level(1).image
+    def _find_cells(
+        self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages
+    ) -> FoundCells:
+        cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort, before))
+        if effort is not EFFORTS[0]:
+            cells = stages.record("grow", regions_as_cells(cells, grow(view, cells), view))
         mesh = stages.record("mesh", build_cell_mesh(cells))
-        if mesh is None or mesh.count < min(MIN_FACES, self._lattice.layers**2):
-            return Unnumbered(Reason.NO_PATTERN, cells)
-        numbering = stages.record("number", number_cells(bgr, cells, mesh, self._lattice))
-        if numbering is None:
-            return Unnumbered(Reason.REFERENCE_LOST, cells)
-        if numbering.doubt is None and self._mirrored not in (None, numbering.mirrored):
-            return Unnumbered(other_side_reason(bgr, cells, numbering, self._nominal_hues_deg), cells)
-        if numbering.doubt is None:
-            attached = number_detached_cells(cells, numbering, self._lattice, mesh.swelling)
-            numbering = stages.record("attach", attached)
-        return (
-            NumberedCells(cells, numbering) if numbering.doubt is None else Unnumbered(numbering.doubt, cells)
+        light = stages.record("light", cell_light(view, cells, mesh))
+        walk = stages.record("walk", walk_cells(mesh, light))
+        return FoundCells(cells, mesh, light, walk)
+
+    def _largest_edge_px(self, view: PyramidLevel) -> float:
+        """The edges of this pattern where it fills the image, px at full scale."""
+        pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
+        return math.sqrt(pixels / (2.0 * len(self._lattice.ink)) * 4.0 / math.sqrt(3.0))
+
+    def _is_whole(self, found: FoundCells) -> bool:
+        """Whether the cells of an image are all found, as far as the cells themselves show it."""
+        return found.linked >= self._registration.min_cells and count_holes(found.walk) <= max(
+            MAX_HOLE_SHARE * found.linked, MIN_HOLES
         )
 
 

@@ -35,6 +35,7 @@ class Origin(StrEnum):
     """The evidence that fixed the start of the numbering."""
 
     WHITE = "white"  # the white cell
+    CODE = "code"  # the white cells of a coded pad
     OUTLINE = "outline"  # the pattern's rim, because the white cell is hidden
     PREVIOUS = "previous"  # the previous frame, because the white cell is hidden
 
@@ -42,16 +43,17 @@ class Origin(StrEnum):
 class Reason(StrEnum):
     """Why no or few markers were found in an image."""
 
-    NO_COLOR = "no_color"  # the image is grayscale, or one of the three inks is absent
+    NO_COLOR = "no_color"  # the image is grayscale
     NO_PATTERN = "no_pattern"  # no triangles that meet as in a pattern
     REFERENCE_LOST = "reference_lost"  # a pattern whose white cell is not visible
     AMBIGUOUS = "ambiguous"  # more than one cell could be the reference
     SEVERAL_PADS = "several_pads"  # several white cells, each with the surrounding cells of a pattern
+    OTHER_CODE = "other_code"  # white cells that are not those of the layout's code
     OTHER_SIDE = (
         "other_side"  # the other side, or red and blue are swapped: the inks do not distinguish the cases
     )
-    MIRRORED = "mirrored"  # the pattern's other side, in inks of the palette's hues
-    SWAPPED_CHANNELS = "swapped_channels"  # the inks have the palette's hues if red and blue are swapped
+    MIRRORED = "mirrored"  # the pattern's other side, in inks of the palette's colors
+    SWAPPED_CHANNELS = "swapped_channels"  # the inks have the palette's colors if red and blue are swapped
     FEW_MARKERS = (
         "few_markers"  # the numbering is known, but fewer than half of the visible markers are reported
     )
@@ -65,8 +67,8 @@ class Reason(StrEnum):
 SIDE_REASONS = (Reason.OTHER_SIDE, Reason.MIRRORED, Reason.SWAPPED_CHANNELS)
 
 _REASON_TEXTS = {
-    Reason.NO_COLOR: "the image holds no colors that could be the three inks; give a color image of the pattern, in "
-    "white light and neither dark nor overexposed",
+    Reason.NO_COLOR: "the image holds no colors; give a color image of the pattern, in light that shows all inks, "
+    "neither dark nor overexposed",
     Reason.NO_PATTERN: "no triangles of the pattern were found; focus, check light and exposure, and show the pattern "
     "with 8 px an edge or more",
     Reason.REFERENCE_LOST: "the white reference cell was not found; uncover or clean it, keep it in view, and check "
@@ -74,12 +76,14 @@ _REASON_TEXTS = {
     Reason.AMBIGUOUS: "the numbering is ambiguous: more than one cell could be the white cell; remove glare and dirt, "
     "and show the pattern around the white cell",
     Reason.SEVERAL_PADS: "several white cells agree with the cells around them; show one pad alone",
+    Reason.OTHER_CODE: "the white cells are not those of the layout's code; give the layout of this pad, or clean the "
+    "pattern and remove glare",
     Reason.OTHER_SIDE: "the pattern is seen from another side than stated: a mirrored camera, the pad's other "
     "face, or an RGB image where BGR is expected; state side or channels",
-    Reason.MIRRORED: "the pattern is seen from another side than stated: by the hues of its inks a mirrored "
+    Reason.MIRRORED: "the pattern is seen from another side than stated: by the colors of its inks a mirrored "
     "camera or the pad's other face; state side, or turn the image or the pad",
     Reason.SWAPPED_CHANNELS: "red and blue are swapped: with both exchanged, the side is the stated side and the "
-    "inks have the layout's hues; state channels, or convert the image to BGR",
+    "inks have the layout's colors; state channels, or convert the image to BGR",
     Reason.FEW_MARKERS: "fewer than half of the visible markers were found; check focus, exposure and light, "
     "uncover or clean the pattern, and check that the layout is the pattern's",
 }

@@ -72,10 +72,10 @@ def _layers_counted(image: Image, markers: Markers) -> int | None:
     """
     from extractor import Extractor, parse_layout
 
-    cells = markers.stages.get("cells")
-    if cells is None:
+    walk = markers.stages.get("walk")
+    if walk is None:
         return None
-    layers = round(float(np.sqrt(len(cells.center_px) / CELLS_PER_LAYERS_SQUARED)))
+    layers = round(float(np.sqrt(np.count_nonzero(walk.part >= 0) / CELLS_PER_LAYERS_SQUARED)))
     if not 1 <= layers <= MAX_LAYERS:
         return None
     for pattern in registered_patterns():

@@ -30,8 +30,8 @@ _SAMPLE_REACH = 0.35
 _MIN_CHROMA_SHARE = 0.4
 _SIDE_CAUSES = {
     "other_side": "a mirrored camera, the pad's other face, or an RGB image saved as BGR",
-    "mirrored": "a mirrored camera or the pad's other face, by the hues of the inks",
-    "swapped_channels": "red and blue are swapped, by the hues of the inks: an RGB image saved as BGR",
+    "mirrored": "a mirrored camera or the pad's other face, by the colors of the inks",
+    "swapped_channels": "red and blue are swapped, by the colors of the inks: an RGB image saved as BGR",
 }
 
 
@@ -116,7 +116,7 @@ def judge_markers(
     reason = (
         _not_found_reason(markers)
         or _wrong_colors_reason(reference, contradictions)
-        or _wrong_side_reason(reference, image, markers)
+        or _wrong_side_reason(reference, markers)
         or _too_few_reason(markers, measured, present, min_share)
     )
     return Verdict(
@@ -149,21 +149,17 @@ def _wrong_colors_reason(reference: Reference, contradictions: tuple[int, ...]) 
     return f"colors contradict the layout: cell {first}, which should be {color}{more}"
 
 
-def _wrong_side_reason(reference: Reference, image: Image, markers: Markers) -> str | None:
+def _wrong_side_reason(reference: Reference, markers: Markers) -> str | None:
     if markers.mirrored == reference.mirrored:
         return None
-    from extractor.image.color import nominal_hues_deg
-    from extractor.numbering.other_side import reason_by_hues
+    from extractor.numbering.ink_fields import Palette
 
     viewed, designed = ("back", "front") if markers.mirrored else ("front", "back")
-    cells = np.flatnonzero(np.isfinite(markers.xy_px[reference.cell_corners]).all(axis=(1, 2)))
-    level = _cell_levels(image, markers.xy_px[reference.cell_corners[cells]])
-    inks = np.full((3, 3), np.nan)
-    for row, ink in enumerate((RED, GREEN, BLUE)):
-        own = reference.cell_color[cells] == ink
-        if own.any():
-            inks[row] = np.median(level[own], axis=0)
-    why = reason_by_hues(inks, nominal_hues_deg(dict(reference.palette)))
+    fields = markers.stages["number"].fields
+    why = "other_side"
+    if fields is not None:
+        shares = fields.shares[[0, 2, 1]]  # as the stated side numbers the classes
+        why = Palette(dict(reference.palette)).other_side_reason(shares)
     remedy = f" ({parameter('channels', 'rgb')})" if why == "swapped_channels" else ""
     return (
         f"the pattern is seen from the {viewed}, but designed to be seen from the {designed}: "

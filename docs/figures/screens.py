@@ -37,12 +37,12 @@ def served(*words: str) -> Iterator[str]:
 
 
 @contextmanager
-def browser(*flags: str) -> Iterator[Any]:
+def browser() -> Iterator[Any]:
     """Chromium, driven by Playwright."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *flags])
+        running = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
         yield running
         running.close()
 

@@ -1,10 +1,7 @@
-"""Stage 6: the cell mesh, a triangular mesh through the cells' centers; its faces are the markers and the black cells.
+"""Stage 6: the cell mesh links the cells that share a corner, by the cells' triangles alone (eqs. 4 and 5).
 
-The centers of the colored cells form a lattice as regular as the pattern's own, and blur that rounds the corners moves
-no center. Every marker is a triangle of a red, a green and a blue center, and so is every black cell; the two kinds
-turn in opposite directions. Cells of one ink are second neighbours in this lattice: an edge of the mesh between two of
-these cells is the wrong diagonal and is flipped. Colors thus determine the right neighbours even where shear has made
-wrong neighbours nearer.
+A link is mutual: each of two cells has a corner that is the nearest to a corner of the other. Their shapes may
+differ; the directions to each other need only agree roughly with their own triangles. No color decides.
 """
 
 from __future__ import annotations
@@ -23,25 +20,35 @@ class CellMeshLimits(NamedTuple):
     """Limits of the mesh.
 
     Attributes:
-        max_flip_rounds: passes over all faces in which edges between cells of one ink are flipped. Measured: rule
-            "flips".
-        min_area_ratio, max_area_ratio: of a face, relative to its cells' mean area; other triangles are no faces. The
-            ratio is about 1 for three neighbours, and at least 2 across a gap. Chosen around the one, and below the
-            other.
-        max_swelling: sides of the cells over those at which neighbours just meet. Ink that bled and overexposure make
-            cells larger; smaller ones are left as they are: in clutter, figures that lie apart must not meet. Chosen.
-        max_corner_gap: L of eq. 5 (neighbouring cells share a corner), in edges of an equilateral cell of the smaller
-            area; cells whose nearest corners are farther apart form no face. Measured: rule "shared corner".
+        first_tolerance: L of eq. 5, in edges of the smaller cell, between two corners while the swelling is unknown;
+            the next corner is an edge away. Chosen.
+        tolerance: the same with the swelling. Chosen.
+        direction_tolerance: in edges, between a neighbour's center and where a cell's own triangle expects it. Chosen.
+        min_swelling, max_swelling: of a whole image. Chosen.
     """
 
-    max_flip_rounds: int = 12
-    min_area_ratio: float = 0.4
-    max_area_ratio: float = 1.9
+    first_tolerance: float = 0.65
+    tolerance: float = 0.4
+    direction_tolerance: float = 0.56
+    min_swelling: float = 0.6
     max_swelling: float = 1.6
-    max_corner_gap: float = 0.4
 
 
 LIMITS = CellMeshLimits()
+
+
+class CellLinks(NamedTuple):
+    """The links of N cells as native loops take them.
+
+    Attributes:
+        neighbours: (N, 6) int32, the linked cells, or -1.
+        back: (N, 6) int8, the step by which each of them leads back, or -1.
+        misfit: (N, 6) float64, in edges, between the corners.
+    """
+
+    neighbours: NDArray[np.int32]
+    back: NDArray[np.int8]
+    misfit: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,32 +56,21 @@ class CellMesh:
     """Stage 6.
 
     Attributes:
-        faces: (F, 3) int32, the red, green and blue cell of each face; -1 thrice for a triangle that is no face.
-        neighbours: (F, 3) int32, the face across the edge opposite to each cell, or -1.
-        orientation: (F,) int8, +1 where red, green, blue run clockwise in the image, -1 counter-clockwise, 0 no face.
-        swelling: sides of the cells' triangles over the sides at which neighbours just meet, 1 to
-            ``CellMeshLimits.max_swelling``.
-        count: number of faces that are markers or black cells.
+        links: the links of the cells.
+        swelling: sides of the cells' triangles over those at which neighbours just meet. Ink that bled and
+            overexposure make cells larger.
     """
 
-    faces: NDArray[np.int32]
-    neighbours: NDArray[np.int32]
-    orientation: NDArray[np.int8]
+    links: CellLinks
     swelling: float
-    count: int
+
+    @property
+    def is_linked(self) -> NDArray[np.bool_]:
+        """(N,) bool, the cells with a link."""
+        return np.asarray((self.links.neighbours >= 0).any(axis=1))
 
 
-def build_cell_mesh(cells: Cells) -> CellMesh | None:
-    """Stage 6: Delaunay triangles of the centers, corrected by color.
-
-    Returns None with fewer than three cells, or with all centers on one line.
-    """
-    mesh = CellMesh(*native.build_cell_mesh(cells, LIMITS))
-    return mesh if len(mesh.faces) else None
-
-
-def without_swelling(
-    center_px: NDArray[np.float64], corner_px: NDArray[np.float64], swelling: float
-) -> NDArray[np.float64]:
-    """The corners (N, 3, 2) of cells whose sides are divided by the swelling, around their centers (N, 2)."""
-    return np.asarray(native.without_swelling(center_px, corner_px, swelling))
+def build_cell_mesh(cells: Cells) -> CellMesh:
+    """Stage 6: the links of the cells."""
+    *links, swelling = native.link_cells(cells.center_px, cells.corner_px, LIMITS)
+    return CellMesh(CellLinks(*links), float(swelling))

@@ -1,111 +1,153 @@
-"""Between recognition and numbering: the colored cells, with their triangles and centers. Blur moves no center."""
+"""Stages 2 and 3: the cells of an image by contrast over the local black, in whatever channels show them best.
+
+A cell is a triangle that is brighter than the black around it. Seven maps show cells: each channel, the sum of the
+channels, and each channel over the mean of the others. In each map the regions above a share of the local contrast are
+taken; regions with the moments of triangles may be cells. Of several at one place the best triangle is kept. No hue and
+no color of the light is assumed.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import cells as native
-from extractor.cells.seeds import Seeds
-from extractor.cells.triangle_fit import Triangles
+from extractor.image.pyramid import PyramidLevel
+
+MIN_SPREAD = 12  # between the channels of a colored pixel, gray levels; chosen
+COLORED_SHARE = 0.002  # of an image that is not gray; chosen
+MIN_TILE_PX = 6  # of the tiles of local levels; chosen
+MAX_TILE_PX = 24
+
+
+class ShapeLimits(NamedTuple):
+    """Limits of the shapes of triangles.
+
+    Attributes:
+        max_elongation: (trace of the covariance)^2 / determinant; 4 is equilateral. Chosen.
+        min_solidity, max_solidity: area over the root of the determinant of the covariance, relative to a triangle's;
+            an ellipse has 1.21, ragged regions have less. Chosen.
+        ragged_weight: of the difference between solidity and 1 in the quality of a shape. Chosen.
+    """
+
+    max_elongation: float = 13.0
+    min_solidity: float = 0.7
+    max_solidity: float = 1.25
+    ragged_weight: float = 1.5
 
 
 class CellLimits(NamedTuple):
-    """Limits of the cells' areas.
+    """Limits of cells.
 
     Attributes:
-        nearest_cells: cells with which an area is compared. Chosen.
-        min_area_share: of the neighbours' median area; smaller domains are dirt. Measured: rule "larger neighbours".
-        max_larger_than_cell: number of nearest cells that make a domain dirt if so much larger: half of
-            ``nearest_cells``, for the median. Derived.
-        min_intact_share: of the neighbours' upper quartile; smaller cells are cut, their centers shifted. Measured:
-            rule "intact cells".
-        max_larger_than_intact: number of nearest cells that make a cell a cut one if so much larger: a quarter of
-            ``nearest_cells`` and one more, for the upper quartile. Derived.
-        min_triangle_share: share of triangles among the cells from which on every other cell is a fragment. Chosen.
-        count_radii: within which cells are counted, in sides of a bucket; they save time and decide nothing. The five
-            by five buckets around a point hold all cells within 2; a disc of 1.1 holds about ``nearest_cells``. Chosen.
+        shape: of their triangles.
+        min_area_px: px^2 at the scale of recognition: edges of 5 px. Chosen.
+        max_area_share: of the image. Chosen.
+        same_place: in edges, of the distance within which two regions are one cell; neighbours are an edge apart.
+            Chosen.
+        min_contrast_deviations: least contrast, in standard deviations of the noise. Chosen.
+        level_weight: in the quality, of the logarithm of a region's level over half of its contrast, where the true
+            outline is. Chosen.
+        tile_px: of the tiles of local levels; a cell and its black neighbours fit into three by three. Derived:
+            half of the largest edge.
     """
 
-    nearest_cells: int = 8
-    min_area_share: float = 0.2
-    max_larger_than_cell: int = 4
-    min_intact_share: float = 0.7
-    max_larger_than_intact: int = 3
-    min_triangle_share: float = 0.6
-    count_radii: tuple[float, ...] = (1.99, 1.5, 1.25, 1.05, 0.9, 0.75)
+    shape: ShapeLimits = ShapeLimits()
+    min_area_px: float = 12.0
+    max_area_share: float = 1 / 30
+    same_place: float = 0.42
+    min_contrast_deviations: float = 7.0
+    level_weight: float = 0.35
+    tile_px: int = MIN_TILE_PX
 
 
 LIMITS = CellLimits()
 
 
-class CellArrays(NamedTuple):
-    """The image's colored cells for native loops.
+class Effort(NamedTuple):
+    """The maps and levels in which cells are sought.
 
     Attributes:
-        center_px, ink, area_px, corner_px: as in ``Cells``.
-        is_intact: (N,) bool, as ``Cells.is_intact``.
+        maps: number of the first maps.
+        shares: of the local contrast, the levels.
     """
 
-    center_px: NDArray[np.float64]
-    ink: NDArray[np.uint8]
-    area_px: NDArray[np.float64]
-    corner_px: NDArray[np.float64]
-    is_intact: NDArray[np.bool_]
+    maps: int
+    shares: NDArray[np.float64]
+
+
+# Most images show every cell in a channel of its own; the others are looked at closely.
+# Chosen, for time.
+EFFORTS = (
+    Effort(3, np.array([0.5])),
+    Effort(7, np.array([0.32, 0.5, 0.65])),
+    Effort(7, np.array([0.2, 0.42, 0.75])),
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The image's colored cells.
+    """The regions of an image that may be colored cells.
 
     Attributes:
         center_px: (N, 2) float64 in the image frame.
-        ink: (N,) uint8, 1 red, 2 green, 3 blue.
         area_px: (N,) float64, px^2.
-        corner_px: (N, 3, 2) float64, the corners clockwise in the image; NaN where the region is no triangle.
+        corner_px: (N, 3, 2) float64, the corners of the triangle with the region's moments, clockwise in the image.
+        quality: (N,) float64, how well the region is a triangle, at most 1.
+        share: (N,) float64, the level of the region as a share of the local contrast.
     """
 
     center_px: NDArray[np.float64]
-    ink: NDArray[np.uint8]
     area_px: NDArray[np.float64]
     corner_px: NDArray[np.float64]
+    quality: NDArray[np.float64]
+    share: NDArray[np.float64]
 
     @property
     def edge_px(self) -> float:
         """The edge of an equilateral triangle of the median area; 0 without cells."""
-        return float(native.equilateral_edge(self.area_px))
-
-    @cached_property
-    def is_intact(self) -> NDArray[np.bool_]:
-        """(N,) bool, cells with a reliable center: about as large as the neighbours and, if most are, triangles."""
-        return np.asarray(native.is_intact(self.center_px, self.area_px, self.corner_px, LIMITS))
-
-    @cached_property
-    def arrays(self) -> CellArrays:
-        """The cells as native loops take them."""
-        return CellArrays(self.center_px, self.ink, self.area_px, self.corner_px, self.is_intact)
+        return math.sqrt(float(np.median(self.area_px)) * 4.0 / math.sqrt(3.0)) if len(self.area_px) else 0.0
 
 
-def find_cells(seeds: Seeds, triangles: Triangles, scale: int) -> Cells:
-    """The domains that are large enough for cells, at full scale; in a cluttered image triangles only.
+def has_color(image: NDArray[np.uint8]) -> bool:
+    """Whether some pixels of an image (H, W, 3) have a color: others than gray, black and white."""
+    spread = image.max(axis=2) - image.min(axis=2)
+    return bool(np.count_nonzero(spread >= MIN_SPREAD) > COLORED_SHARE * spread.size)
+
+
+def find_cells(
+    view: PyramidLevel, largest_edge_px: float, effort: Effort, before: Cells | None = None
+) -> Cells:
+    """The regions that may be cells.
 
     Args:
-        seeds: the domains, at 1/``scale`` of the image's scale.
-        triangles: at full scale.
-        scale: full-scale pixels per pixel of the seeds.
+        view: the image at the scale of recognition.
+        largest_edge_px: edges, at full scale, of a pattern that fills the image; sizes the tiles of local levels.
+        effort: maps and levels.
+        before: regions that were found with less effort.
     """
-    found = triangles.region, triangles.corner_px
-    domains = seeds.center, seeds.ink, seeds.area_px
-    return Cells(*native.cell_arrays(*domains, *found, scale, seeds.cluttered, LIMITS))
-
-
-def cells_with_triangles(cells: Cells, triangles: Triangles) -> Cells:
-    """A copy of the cells with other triangles; ``triangles.region`` is the index of the cell."""
-    center, corners = cells.center_px.copy(), cells.corner_px.copy()
-    corners[triangles.region] = triangles.corner_px
-    center[triangles.region] = triangles.corner_px.mean(axis=1)
-    return Cells(center, cells.ink, cells.area_px, corners)
+    scale = view.scale
+    tile_px = int(min(max(0.5 * largest_edge_px / scale, MIN_TILE_PX), MAX_TILE_PX))
+    known = (np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3, 2)), np.zeros(0), np.zeros(0))
+    if before is not None:
+        corners = view.to_level(before.corner_px)
+        known = (
+            view.to_level(before.center_px),
+            before.area_px / scale**2,
+            corners,
+            before.quality,
+            before.share,
+        )
+    center, area, corner, quality, share = native.find_candidates(
+        np.ascontiguousarray(view.image),
+        0,
+        effort.maps,
+        effort.shares,
+        *known,
+        LIMITS._replace(tile_px=tile_px),
+    )
+    return Cells(view.to_full_scale(center), area * scale**2, view.to_full_scale(corner), quality, share)

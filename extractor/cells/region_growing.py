@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import cells as native
-from extractor.cells.seeds import Seeds
-from extractor.image.ink_segmentation import Segmentation
+from extractor.cells.cells import Cells
+from extractor.image.pyramid import PyramidLevel
+
+MAX_GROWN_AREA = 2.0  # of the seed's region; a larger region has leaked. Chosen
 
 
 class GrowLimits(NamedTuple):
@@ -33,23 +36,24 @@ class Regions:
 
     Attributes:
         region_map: (H, W) int32, the region of each pixel, counted from 1; 0 without a region.
-        ink: (N,) uint8, 1 red, 2 green, 3 blue.
         seed: (N, 2) int32, x and y of the pixel about which the moments are taken.
         moments: (N, 10) float64, sums of 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy over the region's pixels.
     """
 
     region_map: NDArray[np.int32]
-    ink: NDArray[np.uint8]
     seed: NDArray[np.int32]
     moments: NDArray[np.float64]
 
 
-def grow(segmentation: Segmentation, seeds: Seeds) -> Regions:
+def grow(view: PyramidLevel, cells: Cells) -> Regions:
     """Stage 4 (AGA): add 4-neighbours to each seed while eq. 3 is below a limit, with the mean updated after each wave.
 
-    Eq. 3 uses OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of hue are circular;
-    ``P . mean = 0`` (black) rejects the pixel instead of dividing. A region never enters another ink's domain.
+    The seeds are the cells' centers. Eq. 3 uses OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of
+    hue are circular; ``P . mean = 0`` (black) rejects the pixel instead of dividing.
     """
-    limit_px = segmentation.label.size // 6
-    framed, moments = native.grow(segmentation.hsv, segmentation.label, seeds.xy, seeds.ink, limit_px, LIMITS)
-    return Regions(region_map=framed[1:-1, 1:-1], ink=seeds.ink, seed=seeds.xy, moments=moments)
+    height, width = view.image.shape[:2]
+    seed = np.clip(np.rint(view.to_level(cells.center_px)), 0, (width - 1, height - 1)).astype(np.int32)
+    limit_px = np.maximum(MAX_GROWN_AREA * cells.area_px / view.scale**2, 1).astype(np.int64)
+    hsv = cv2.cvtColor(view.image, cv2.COLOR_BGR2HSV)
+    framed, moments = native.grow(hsv, seed, limit_px, LIMITS)
+    return Regions(region_map=framed[1:-1, 1:-1], seed=seed, moments=moments)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import complete as native
-from extractor.cells.cells import Cells
 from extractor.image.input import LIMITS as NOISE_LIMITS
 from extractor.image.input import NoiseLimits
 from extractor.image.pyramid import PyramidLevel
@@ -109,25 +108,16 @@ def measure_quality(
     return _quality(CellFigures(*found), blur_px, noise, edge_px)
 
 
-def measure_quality_without_numbers(view: PyramidLevel, cells: Cells | None, has_pattern: bool) -> Quality:
+def measure_quality_without_numbers(view: PyramidLevel, edge_px: float) -> Quality:
     """The quality of an image in which no cell was numbered.
 
     Args:
         view: the image at full scale.
-        cells: the found cells, if any.
-        has_pattern: whether cells are neighbours as in a pattern; the area of other cells gives no edge.
+        edge_px: the median side of cells that are neighbours as in a pattern; NaN without any.
     """
-    clipping = float(
-        (view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE].max(axis=2) >= LIMITS.clipped_value).mean()
-    )
-    if cells is None or len(cells.ink) == 0:
-        return replace(UNKNOWN, clipping=clipping)
-    color = (cells.ink - 1).astype(np.uint8)
-    chosen = _spread(color)
-    center_px = np.ascontiguousarray(cells.center_px[chosen])
-    found = CellFigures(*native.measure_cells(view, center_px, color[chosen], cells.edge_px, LIMITS))
-    edge_px = cells.edge_px if has_pattern else math.nan
-    return replace(_quality(found, math.nan, math.nan, edge_px), clipping=clipping)
+    sampled = view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE]
+    clipping = float((sampled.max(axis=2) >= LIMITS.clipped_value).mean())
+    return replace(UNKNOWN, clipping=clipping, edge_px=edge_px)
 
 
 def _quality(found: CellFigures, blur_px: float, noise: float, edge_px: float) -> Quality:

@@ -72,6 +72,7 @@ class Lattice:
         corner_ids: (U, 3) int32, the markers (q, r), (q + 1, r), (q, r + 1) of every colored cell.
         ink: (U,) uint8, 1 red, 2 green, 3 blue.
         axial: (U, 2) int32, the cells' (q, r).
+        white_axial: (W, 2) int32, (q, r) of the white down-cells.
         layer: (M,) int32, the markers' layers.
         neighbours: (M, 18) int32, the markers in the two rings around each marker, -1 outside the pattern.
         ring_weights: (M, 18) float64, weights of ``neighbours`` that give a marker's place; 0 where these are too few.
@@ -84,6 +85,7 @@ class Lattice:
     corner_ids: NDArray[np.int32]
     ink: NDArray[np.uint8]
     axial: NDArray[np.int32]
+    white_axial: NDArray[np.int32]
     layer: NDArray[np.int32]
     neighbours: NDArray[np.int32]
     ring_weights: NDArray[np.float64]
@@ -128,12 +130,6 @@ class Lattice:
         )
 
     @cached_property
-    def white_cell_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(2,) the center of the white cell, mm, and (2, 2) the layout vectors of one axial step in q and r, mm."""
-        below, left, right = self.marker_mm[:3]
-        return (below + left + right) / 3, np.stack([right - left, right - below], axis=1)
-
-    @cached_property
     def first_ring(self) -> NDArray[np.int32]:
         """(M, 6) int32, the six markers around each marker, -1 outside the pattern."""
         return np.ascontiguousarray(self.neighbours[:, FIRST_RING])
@@ -158,6 +154,7 @@ def lattice_of(reference: Reference) -> Lattice:
         corner_ids=corner_marker_ids(coordinates[lower_left]),
         ink=(reference.cell_color[inked] + 1).astype(np.uint8),
         axial=coordinates[lower_left],
+        white_axial=_down_axial(coordinates[reference.cell_corners[reference.cell_color == WHITE]]),
         layer=reference.layer,
         neighbours=neighbours,
         ring_weights=ring_weights(reference.xy_mm, neighbours),
@@ -170,6 +167,11 @@ def _cell_lookup_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int3
     lookup = np.full((2 * layers + 3, 2 * layers + 3), -1, np.int32)
     lookup[axial[:, 0] + layers + 1, axial[:, 1] + layers + 1] = np.arange(len(axial))
     return lookup
+
+
+def _down_axial(corners: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(W, 2) int32, (q, r) of the down-cells with corners (W, 3, 2): these add up to (3q - 1, 3r + 2)."""
+    return np.ascontiguousarray((corners.sum(axis=1) + (1, -2)) // 3, dtype=np.int32)
 
 
 def cells_at(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:

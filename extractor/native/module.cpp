@@ -23,7 +23,6 @@ void add_localmap(nb::module_ module);
 
 namespace cmp::numbering {
 void add_numbering(nb::module_ module);
-void add_gaps(nb::module_ module);
 }  // namespace cmp::numbering
 
 namespace cmp::numeric {
@@ -50,7 +49,6 @@ NB_MODULE(_native, module) {
   cmp::image::add_image(module.def_submodule("image"));
   cmp::cells::add_cells(module.def_submodule("cells"));
   cmp::numbering::add_numbering(module.def_submodule("numbering"));
-  cmp::numbering::add_gaps(module.def_submodule("gaps"));
   cmp::refine::add_refine(module.def_submodule("refine"));
   cmp::refine::add_measure(module.def_submodule("measure"));
   cmp::refine::add_synthesis(module.def_submodule("synthesis"));

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import numbering as native
-from extractor.cells.cells import Cells
 from extractor.layout.lattice_tables import Lattice
 from extractor.localmap.affine_maps import LIMITS as MAP_LIMITS
 from extractor.localmap.affine_maps import AffineMapLimits
-from extractor.numbering.lattice_walk import Numbering
+from extractor.numbering.missing_cells import NumberedTriangles
 
 AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend; chosen
 # in edges, between a marker's place by its gridlines and a correct initial place; chosen
@@ -56,19 +55,18 @@ class InitialMarkers(NamedTuple):
     is_intact: NDArray[np.bool_]
 
 
-def merge_corners(cells: Cells, numbering: Numbering, lattice: Lattice) -> InitialMarkers:
+def merge_corners(cells: NumberedTriangles, lattice: Lattice) -> InitialMarkers:
     """Merge the corners at each marker (eq. 4: at most one red, green and blue).
 
     A cell's corners are those of its triangle where the triangle agrees with the prediction by the cell's neighbours,
     else the predicted ones.
 
     Args:
-        cells: the cells of the image.
-        numbering: their numbers.
+        cells: the numbered cells of the image.
         lattice: the layout.
 
     Returns:
         The markers before refinement.
     """
     tables = lattice.layout_cells, lattice.corner_ids, len(lattice.marker_mm)
-    return InitialMarkers(*native.merge_corners(cells, numbering, *tables, LIMITS))
+    return InitialMarkers(*native.merge_corners(cells, cells, *tables, LIMITS))

@@ -21,6 +21,4 @@ def nearest_points(xy: Points, queries: Points, count: int = 1) -> NDArray[np.in
     Raises:
         ValueError: ``count`` is larger than N.
     """
-    return np.asarray(
-        native.nearest_points(np.ascontiguousarray(xy), np.ascontiguousarray(queries, np.float64), count)
-    )
+    return np.asarray(native.nearest_points(xy, queries, count))

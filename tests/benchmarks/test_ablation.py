@@ -31,9 +31,9 @@ NATIVE_READING = Rule(
     "native reading",
     "",
     "accuracy",
-    "extractor/native/image/ink_segmentation.cpp",
-    "out[x] = static_cast<std::uint8_t>(inside[x] * (one + 2 * two + 3 * three));",
-    "out[x] = static_cast<std::uint8_t>(0 * inside[x] * (one + 2 * two + 3 * three));",
+    "extractor/native/image/contrast_maps.cpp",
+    "static_cast<std::uint8_t>(((sum * factor) >> 16) + mix.offset)",
+    "static_cast<std::uint8_t>(0 * sum * factor)",
 )
 
 
@@ -66,7 +66,7 @@ def test_rules_are_told_apart_by_name() -> None:
     assert len({rule.name for rule in RULES}) == len(RULES)
     assert {rule.kind for rule in RULES} == {"accuracy", "errors and time", "no wrong id"}
     assert {rule.stage for rule in RULES} == {
-        *("pipeline", "image", "cells", "numbering", "localmap", "refine", "complete")
+        *("pipeline", "cells", "numbering", "localmap", "refine", "complete")
     }
 
 

@@ -6,13 +6,13 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
 from benchmarks.suites.article.corners import fit_plain_triangles
+from benchmarks.suites.article.regions import InkRegions
 from benchmarks.suites.comparison.measure import CASES, measure_case, point_errors
 from benchmarks.suites.comparison.methods import METHODS, REFERENCE_METHOD
 from benchmarks.suites.comparison.pooled import measure_pooled, pooled_cases
@@ -134,7 +134,7 @@ def test_the_articles_corners_are_those_of_the_triangles() -> None:
     corner = np.array([[10, 60], [40, 12], [68, 64]])
     cv2.fillConvexPoly(owner, corner[:, None], 1)
     cv2.circle(owner, (110, 40), 22, 2, -1)
-    found = fit_plain_triangles(SimpleNamespace(region_map=owner, ink=np.array([2, 3], np.uint8)))
+    found = fit_plain_triangles(InkRegions(owner, np.array([2, 3], np.uint8)))
     assert list(found.region) == [0] and list(found.ink) == [2]
     away = np.linalg.norm(found.corner_px[0][:, None] - corner[None], axis=2)
     assert away.min(axis=0).max() < 1.0

@@ -24,7 +24,7 @@ from extractor import Extractor, Markers, Reason, Status
 PICTURES = load_pictures(PICTURES_FOLDER)
 BY_NAME = {picture.name: picture for picture in PICTURES}
 FIRST = first_of_families(PICTURES)
-NOT_ALWAYS_READ = "ILN"  # all effects together, and where there is nothing to read
+NOT_ALWAYS_READ = "N"  # where there is nothing to read
 
 
 def read(picture: TracedPicture) -> Markers:

@@ -40,8 +40,7 @@ def test_every_field_has_unit_range_and_default() -> None:
 
 
 def test_each_picture_gives_its_reason() -> None:
-    reader = Extractor(failures.pattern_reference())
-    assert {one.reason: reader.extract(one.image).reason for one in failures.failures()} == {
+    assert {one.reason: Extractor(one.layout).extract(one.image).reason for one in failures.failures()} == {
         reason: reason for reason in Reason
     }
 

@@ -137,7 +137,7 @@ def test_an_edge_is_that_of_a_pattern() -> None:
     noise = read(np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8))
     assert noise.reason is Reason.NO_PATTERN and np.isnan(noise.quality.edge_px)  # type: ignore[union-attr]
     assert not any("px an edge" in text for text in noise.quality.hints)  # type: ignore[union-attr]
-    small = read(cv2.resize(shot().image, None, fx=0.1, fy=0.1, interpolation=cv2.INTER_AREA))
+    small = read(cv2.resize(shot().image[:, :150], None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA))
     assert small.reason is Reason.REFERENCE_LOST
     assert any("px an edge" in text for text in small.quality.hints)  # type: ignore[union-attr]
 

@@ -2,7 +2,7 @@
 
 A rule is a threshold, a branch or a fallback without which the reader would still work. The text occurs exactly once in
 its file. A threshold is switched off in the limits of its Python module, which need no compiler. The stages themselves
-(inks, growing, mesh, walk) are no rules.
+(seeds, mesh, walk, registration) are no rules.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from benchmarks.suites.ablation.cell_rules import CELLS, IMAGE, PIPELINE
+from benchmarks.suites.ablation.cell_rules import CELLS, PIPELINE
 from benchmarks.suites.ablation.marker_rules import COMPLETE, PLACES, REFINEMENT
-from benchmarks.suites.ablation.numbering_rules import GAPS, NUMBERING
+from benchmarks.suites.ablation.numbering_rules import ATTACHMENT, REGISTRATION, WALK
 
-RULES = (*PIPELINE, *IMAGE, *CELLS, *NUMBERING, *GAPS, *PLACES, *REFINEMENT, *COMPLETE)
+RULES = (*PIPELINE, *CELLS, *WALK, *REGISTRATION, *ATTACHMENT, *PLACES, *REFINEMENT, *COMPLETE)
 BY_NAME = {rule.name: rule for rule in RULES}

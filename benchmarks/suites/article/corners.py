@@ -8,11 +8,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.cells.region_growing import Regions
-from extractor.cells.triangle_fit import Triangles
+from benchmarks.suites.article.regions import InkRegions
 
 MIN_AREA_PX = 4.0
 MIN_FILL = 0.6  # smallest share of a triangle's area that its contour fills ("area, perimeter")
+
+
+class Triangles(NamedTuple):
+    """Triangles of regions.
+
+    Attributes:
+        corner_px: (T, 3, 2) float64, clockwise in the image.
+        ink: (T,) uint8, 1 red, 2 green, 3 blue.
+        region: (T,) int32, the number of the region, from 0.
+    """
+
+    corner_px: NDArray[np.float64]
+    ink: NDArray[np.uint8]
+    region: NDArray[np.int32]
 
 
 class RegionBoxes(NamedTuple):
@@ -24,7 +37,7 @@ class RegionBoxes(NamedTuple):
     bottom: NDArray[np.intp]
 
 
-def fit_plain_triangles(regions: Regions) -> Triangles:
+def fit_plain_triangles(regions: InkRegions) -> Triangles:
     """The smallest triangle around every region that fills its triangle."""
     corners, kept = [], []
     boxes = _region_boxes(regions.region_map, len(regions.ink))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from extractor.cells.triangle_fit import Triangles
+from benchmarks.suites.article.corners import Triangles
 
 # L of eq. 5 in units of the shortest edge at either corner. Corners of different markers are at least one edge apart.
 MERGE_SHARE = 0.4

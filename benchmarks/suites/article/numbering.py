@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.article.corners import Triangles
 from benchmarks.suites.article.graph import CornerGraph
-from extractor.cells.triangle_fit import Triangles
 from extractor.layout.lattice import axial_coordinates, layer_of, marker_id
 from extractor.layout.reference import BLACK, WHITE, Reference
 from extractor.numeric.bilinear import fill_patch_mean

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.suites.article.corners import fit_plain_triangles
 from benchmarks.suites.article.graph import connect_corners
 from benchmarks.suites.article.numbering import make_lattice_tables, number_triangles
+from benchmarks.suites.article.regions import grow_from_hues
 from benchmarks.support.scenes import (
     BOARD_LAYERS,
     SceneCase,
@@ -23,11 +24,6 @@ from benchmarks.support.scenes import (
     make_extractor,
 )
 from extractor import Extractor
-from extractor.cells.region_growing import grow
-from extractor.cells.seeds import find_seeds
-from extractor.image.color import nominal_hues_deg, to_colors
-from extractor.image.ink_segmentation import segment
-from extractor.image.target_area import find_target
 from extractor.presets import Preset
 
 Image = NDArray[np.uint8]
@@ -117,15 +113,12 @@ def read_subpix_by_id(case: SceneCase, image: Image) -> Reading:
 
 def read_by_article(case: SceneCase, image: Image) -> Reading:
     """The article's method: regions by AGA, triangles fitted to contours, merged and averaged corners, SSA."""
-    layout = cached_reference(case.pattern, case.layers)
-    lattice, hues_deg = make_lattice_tables(layout), nominal_hues_deg(dict(layout.palette))
+    layout, reader = cached_reference(case.pattern, case.layers), method_extractor(case, "balanced")
+    lattice = make_lattice_tables(layout)
     started = time.process_time()
-    colors = to_colors(image)
-    segmentation = segment(colors, find_target(colors), hues_deg)
     points = np.full((len(layout.layer), 2), np.nan)
-    if segmentation is None:
-        return Reading(points, _elapsed_ms(started))
-    triangles = fit_plain_triangles(grow(segmentation, find_seeds(segmentation)))
+    view = reader.pyramid(np.ascontiguousarray(image), image.dtype).level(1)
+    triangles = fit_plain_triangles(grow_from_hues(view, dict(layout.palette)))
     found = number_triangles(image, triangles, connect_corners(triangles), lattice)
     if found is not None:
         ids = found.marker_of_corner.reshape(-1)

@@ -21,28 +21,30 @@ from extractor import Reason, Reference, parse_layout
 Picture = NDArray[np.uint8]
 SIZE_PX = (320, 240)
 LAYERS = 6
+CODE_SHOWN, CODE_READ = 1, 2
 COVER = 90  # gray level of what lies on the pattern
 WHITE, BLACK = COLORS.index("white"), COLORS.index("black")
 
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """A picture (H, W, 3) uint8 BGR that gives a reason."""
+    """A picture (H, W, 3) uint8 BGR that gives a reason, and the layout with which it is read."""
 
     reason: Reason
     image: Picture
+    layout: Reference
 
 
 @cache
-def pattern() -> Layout:
-    """The layout with which the pictures are read."""
-    return build_layout(Design(pattern="honeycomb", layers=LAYERS, pitch_mm=1.5))
+def pattern(code: int = 0) -> Layout:
+    """The layout with which the pictures are read; with a code, for the picture of another code."""
+    return build_layout(Design(pattern="honeycomb", layers=LAYERS, pitch_mm=1.5, code=code))
 
 
 @cache
-def pattern_reference() -> Reference:
+def pattern_reference(code: int = 0) -> Reference:
     """The same as the reader has it."""
-    return parse_layout(layout_to_json(pattern()))
+    return parse_layout(layout_to_json(pattern(code)))
 
 
 def figures() -> dict[str, bytes]:
@@ -60,14 +62,18 @@ def failures() -> tuple[Failure, ...]:
         Reason.NO_COLOR: gray,
         Reason.NO_PATTERN: out_of_focus,
         Reason.REFERENCE_LOST: covered_center,
-        Reason.AMBIGUOUS: two_white_cells,
+        Reason.AMBIGUOUS: two_bright_drops,
         Reason.SEVERAL_PADS: two_pads,
+        Reason.OTHER_CODE: another_code,
         Reason.OTHER_SIDE: other_side_in_other_inks,
         Reason.MIRRORED: mirrored,
         Reason.SWAPPED_CHANNELS: swapped,
         Reason.FEW_MARKERS: mostly_covered,
     }
-    return tuple(Failure(reason, makers[reason]()) for reason in Reason)
+    read = {Reason.OTHER_CODE: pattern_reference(CODE_READ)}
+    return tuple(
+        Failure(reason, makers[reason](), read.get(reason, pattern_reference())) for reason in Reason
+    )
 
 
 def view(layout: Layout | None = None, pitch_px: float = 15.0, **changes: object) -> Picture:
@@ -96,19 +102,27 @@ def covered_center() -> Picture:
     return view(pitch_px=34.0, damage=Damage(blobs=(Blob((0.0, 0.8), 1.6, (60.0, 70.0, 80.0)),)))
 
 
-def two_white_cells() -> Picture:
-    """A black cell beside the centre is as bright as the white one, and a ring of dirt hides the rim."""
+def two_bright_drops() -> Picture:
+    """Drops on two black cells, the white cell under dirt, and a ring of dirt that hides the rim."""
     layout = pattern()
-    color = layout.cell_color.copy()
     centers_mm = layout.marker_xy_mm[layout.cell_corners].mean(axis=1)
-    other_mm = centers_mm[color == WHITE][0] + (1.5, -2.6)
-    black = np.flatnonzero(color == BLACK)
-    color[black[np.linalg.norm(centers_mm[black] - other_mm, axis=1).argmin()]] = WHITE
-    return framed(view(replace(layout, cell_color=color)), 60)
+    black_mm = centers_mm[layout.cell_color == BLACK]
+    white_mm = centers_mm[layout.cell_color == WHITE][0]
+    places = (white_mm + (1.5, -2.6), white_mm + (-1.5, -2.6))
+    drops = tuple(
+        Blob(tuple(black_mm[np.linalg.norm(black_mm - place, axis=1).argmin()]), 0.4, (240.0, 240.0, 240.0))
+        for place in places
+    )
+    dirt = Blob(tuple(white_mm), 0.8, (20.0, 20.0, 20.0))
+    return framed(view(damage=Damage(blobs=(*drops, dirt))), 60)
 
 
 def two_pads() -> Picture:
     return np.hstack([view(pitch_px=11.0)[:, 80:240]] * 2)
+
+
+def another_code() -> Picture:
+    return view(pattern(CODE_SHOWN))
 
 
 def mirrored() -> Picture:
@@ -116,8 +130,8 @@ def mirrored() -> Picture:
 
 
 def other_side_in_other_inks() -> Picture:
-    """The back of a pattern whose inks have neither the palette's hues nor those with red and blue swapped."""
-    inks = {**pattern().palette, "red": "#c8642d", "green": "#28964c", "blue": "#2d6ebe"}
+    """The back of a pattern whose inks are as near to the palette's as to those with red and blue swapped."""
+    inks = {**pattern().palette, "red": "#c3372d", "green": "#329632", "blue": "#2d37c3"}
     return np.ascontiguousarray(view(replace(pattern(), palette=inks))[:, ::-1])
 
 

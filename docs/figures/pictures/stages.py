@@ -12,9 +12,8 @@ from .sample import SIZE, sample
 
 Picture = NDArray[np.uint8]
 
-# The shown part of the frame, and the stages that are shown completely.
+# The shown part of the frame.
 WINDOW_PX = (150, 75, 410, 270)  # left, top, right, bottom
-WHOLE = ("target",)
 WIDTH_PX = 520
 
 
@@ -23,12 +22,10 @@ def figures() -> dict[str, bytes]:
     shown = sample()
     pictures = draw_stages(shown.pressed_image, shown.reference, shown.pressed)
     found = {"image": shown.pressed_image, **pictures}
-    return {f"stage-{name}.png": _png(_small(picture, name in WHOLE)) for name, picture in found.items()}
+    return {f"stage-{name}.png": _png(_small(picture)) for name, picture in found.items()}
 
 
-def _small(picture: Picture, whole: bool) -> Picture:
-    if whole:
-        return _reduced(picture, WIDTH_PX)
+def _small(picture: Picture) -> Picture:
     scale = picture.shape[1] // SIZE[0]
     left, top, right, bottom = (scale * side for side in WINDOW_PX)
     cropped = picture[top:bottom, left:right]

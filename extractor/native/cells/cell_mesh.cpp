@@ -1,182 +1,192 @@
 #include "cells/cell_mesh.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
+#include <vector>
 
-#include "numeric/delaunay.hpp"
 #include "numeric/median.hpp"
+#include "numeric/nearest_points.hpp"
 
 namespace cmp::cells {
 
 namespace {
 
-// The column of a value in row i of `rows` (N, 3).
-int index_in_row(View<const std::int32_t, 2> rows, Index i, std::int32_t value) {
-  return rows(i, 0) == value ? 0 : rows(i, 1) == value ? 1 : 2;
-}
+constexpr int CORNERS = 3;
+constexpr Index NEAREST = 5;  // corners that are looked at; three cells meet at a marker
 
-// Twice the signed area of the points a, b, c; positive if clockwise, y down.
-double doubled_area(View<const double, 2> xy, Index a, Index b, Index c) {
-  const double x = xy(a, 0), y = xy(a, 1);
-  return (xy(b, 0) - x) * (xy(c, 1) - y) - (xy(b, 1) - y) * (xy(c, 0) - x);
-}
+struct Vector {
+  double x, y;
 
-// Flips the edge opposite to corner k of face f if it joins cells of one ink and may be flipped.
-bool flip_edge(View<const double, 2> points, View<const std::uint8_t, 1> ink, View<std::int32_t, 2> faces,
-               View<std::int32_t, 2> neighbours, std::int32_t f, int k) {
-  const int next = (k + 1) % 3, last = (k + 2) % 3;
-  const std::int32_t g = neighbours(f, k);
-  if (g < f) return false;
-  const std::int32_t a = faces(f, next), b = faces(f, last), c = faces(f, k);
-  const std::int32_t d = faces(g, index_in_row(neighbours, g, f));
-  if (ink[a] != ink[b] || ink[c] == ink[d] || ink[c] == ink[a] || ink[d] == ink[a]) return false;
-  // the quadrilateral must be convex: both new triangles turn the same way
-  if (doubled_area(points, c, a, d) * doubled_area(points, c, d, b) <= 0.0) return false;
-  const std::int32_t beyond_bc = neighbours(f, next), beyond_ca = neighbours(f, last);
-  const std::int32_t beyond_ad = neighbours(g, index_in_row(faces, g, b));
-  const std::int32_t beyond_db = neighbours(g, index_in_row(faces, g, a));
-  const auto write = [](View<std::int32_t, 2> rows, Index i, std::array<std::int32_t, 3> values) {
-    std::copy(values.begin(), values.end(), rows[i].begin());
-  };
-  write(faces, f, {c, a, d});
-  write(neighbours, f, {beyond_ad, g, beyond_ca});
-  write(faces, g, {c, d, b});
-  write(neighbours, g, {beyond_db, beyond_bc, f});
-  if (beyond_ad >= 0) neighbours(beyond_ad, index_in_row(neighbours, beyond_ad, g)) = f;
-  if (beyond_bc >= 0) neighbours(beyond_bc, index_in_row(neighbours, beyond_bc, f)) = g;
-  return true;
-}
-
-// Whether cells a and b have a common corner; true if one of them has no triangle.
-bool has_shared_corner(View<const double, 3> corner, View<const double, 1> area, Index a, Index b,
-                       double max_gap) {
-  if (std::isnan(corner(a, 0, 0)) || std::isnan(corner(b, 0, 0))) return true;
-  const double limit = max_gap * max_gap * std::min(area[a], area[b]) * 4.0 / std::sqrt(3.0);
-  double nearest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const double dx = corner(a, i, 0) - corner(b, j, 0), dy = corner(a, i, 1) - corner(b, j, 1);
-      nearest = std::min(nearest, dx * dx + dy * dy);
-    }
-  }
-  return nearest < limit;
-}
-
-bool has_three_inks(View<const std::uint8_t, 1> ink, Index a, Index b, Index c) {
-  return ink[a] != ink[b] && ink[b] != ink[c] && ink[a] != ink[c];
-}
-
-// The mesh without its swelling.
-struct ClassifiedFaces {
-  Array<std::int32_t, 2> faces, neighbours;  // (F, 3), as in CellMesh
-  Array<std::int8_t, 1> orientation;         // (F,), as in CellMesh
+  double length() const { return std::sqrt(x * x + y * y); }
+  friend Vector operator-(Vector a, Vector b) { return {a.x - b.x, a.y - b.y}; }
 };
 
-// Flips edges between cells of one ink where the other diagonal joins two other inks.
-//
-// points (N, 2), ink (N,); faces (F, 3) and neighbours (F, 3) are updated.
-void update_flipped_edges(View<const double, 2> points, View<const std::uint8_t, 1> ink,
-                          View<std::int32_t, 2> faces, View<std::int32_t, 2> neighbours,
-                          const CellMeshLimits& limits) {
-  for (std::int64_t round = 0; round < limits.max_flip_rounds; ++round) {
-    Index flips = 0;
-    for (std::int32_t f = 0; f < faces.size(); ++f) {
-      for (int k = 0; k < 3; ++k) {
-        if (!flip_edge(points, ink, faces, neighbours, f, k)) continue;
-        ++flips;
-        break;
+// The number of the step by which a neighbour shares corner i, where the neighbour's place is that of corner
+// j.
+constexpr Index step_of(int i, int j) {
+  for (Index k = 0; k < STEPS; ++k)
+    if (STEP_CORNERS[k][0] == i && STEP_CORNERS[k][1] == j) return k;
+  return -1;
+}
+
+// Two corners that may be one, and the step between their cells.
+struct Contact {
+  std::int32_t from, to;
+  std::int8_t step, back;
+};
+
+// The triangles of N cells, about their centers.
+class Triangles {
+ public:
+  Triangles(View<const double, 2> center, View<const double, 3> corner)
+      : center_(center),
+        corner_(corner.shape()),
+        edge_({center.size()}),
+        points_({CORNERS * center.size(), 2}) {
+    for (Index i = 0; i < center.size(); ++i) {
+      for (int k = 0; k < CORNERS; ++k)
+        for (int axis = 0; axis < 2; ++axis) {
+          corner_(i, k, axis) = corner(i, k, axis) - center(i, axis);
+          points_(CORNERS * i + k, axis) = corner(i, k, axis);
+        }
+      const Vector u = at(i, 1) - at(i, 0), v = at(i, 2) - at(i, 0);
+      edge_[i] = std::sqrt(std::abs(u.x * v.y - u.y * v.x) * 2.0 / std::sqrt(3.0));
+    }
+  }
+
+  // The contacts of corners that are nearer than the tolerance, in edges.
+  std::vector<Contact> contacts(double tolerance, double direction_tolerance) const {
+    const auto grid = numeric::bucket_grid(points_);
+    std::vector<Contact> out;
+    Array<std::int32_t, 1> index({NEAREST});
+    Array<double, 1> square({NEAREST});
+    for (Index point = 0; point < points_.size(); ++point) {
+      const Index i = point / CORNERS;
+      const Index found =
+          numeric::fill_nearest_points(grid, points_(point, 0), points_(point, 1), index, square);
+      for (Index n = 0; n < found; ++n) {
+        const Index other = index[n] / CORNERS;
+        const double reach = tolerance * std::min(edge_[i], edge_[other]);
+        if (other != i && square[n] < reach * reach)
+          add_contact(out, i, static_cast<int>(point % CORNERS), other, index[n] % CORNERS,
+                      direction_tolerance);
       }
     }
-    if (flips == 0) break;
+    return out;
   }
-}
+  // The distance between the corners of a contact, in edges of the smaller cell, of triangles without a
+  // swelling.
+  double misfit(const Contact& contact, double swelling) const {
+    const Vector own = at(contact.from, STEP_CORNERS[contact.step][0]), way = way_of(contact);
+    const Vector other = at(contact.to, STEP_CORNERS[contact.back][0]);
+    const Vector gap{way.x - (own.x - other.x) / swelling, way.y - (own.y - other.y) / swelling};
+    return gap.length() / std::min(edge_[contact.from], edge_[contact.to]);
+  }
+  // The distance of two cells at which their triangles would just meet, over their distance.
+  double swelling(const Contact& contact) const {
+    const Vector met =
+        at(contact.from, STEP_CORNERS[contact.step][0]) - at(contact.to, STEP_CORNERS[contact.back][0]);
+    const Vector way = way_of(contact);
+    return (met.x * way.x + met.y * way.y) / std::max(way.x * way.x + way.y * way.y, 1e-12);
+  }
 
-// Corners as red, green, blue; only triangles that are markers or black cells.
-//
-// points (N, 2), ink (N,), area (N,), corner (N, 3, 2) of the cells; faces (F, 3), neighbours (F, 3).
-ClassifiedFaces classify_faces(View<const double, 2> points, View<const std::uint8_t, 1> ink,
-                               View<const double, 1> area, View<const double, 3> corner,
-                               View<const std::int32_t, 2> faces, View<const std::int32_t, 2> neighbours,
-                               const CellMeshLimits& limits) {
-  const Index count = faces.size();
-  Array<std::int32_t, 2> ordered({count, 3}, -1), across({count, 3}, -1);
-  Array<std::int8_t, 1> orientation({count}, 0);
-  for (Index f = 0; f < count; ++f) {
-    const std::int32_t a = faces(f, 0), b = faces(f, 1), c = faces(f, 2);
-    if (!has_three_inks(ink, a, b, c)) continue;
-    const double size = 0.5 * std::abs(doubled_area(points, a, b, c));
-    const double mean = (area[a] + area[b] + area[c]) / 3.0;
-    if (size < limits.min_area_ratio * mean || size > limits.max_area_ratio * mean) continue;
-    const double gap = limits.max_corner_gap;
-    if (!has_shared_corner(corner, area, a, b, gap) || !has_shared_corner(corner, area, b, c, gap) ||
-        !has_shared_corner(corner, area, c, a, gap))
-      continue;
-    for (int k = 0; k < 3; ++k) {
-      const int column = ink[faces(f, k)] - 1;
-      ordered(f, column) = faces(f, k);
-      across(f, column) = neighbours(f, k);
-    }
-    const bool is_clockwise = doubled_area(points, ordered(f, 0), ordered(f, 1), ordered(f, 2)) > 0.0;
-    orientation[f] = is_clockwise ? 1 : -1;
+ private:
+  Vector at(Index i, Index k) const { return {corner_(i, k, 0), corner_(i, k, 1)}; }
+  Vector way_of(const Contact& c) const {
+    return {center_(c.to, 0) - center_(c.from, 0), center_(c.to, 1) - center_(c.from, 1)};
   }
-  for (Index f = 0; f < count; ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const std::int32_t g = across(f, k);
-      if (g >= 0 && orientation[g] != -orientation[f]) across(f, k) = -1;
-    }
+  // How far the neighbour lies from where the cell's own triangle expects it, in edges.
+  double direction_misfit(Index i, Index shared, Index from, Vector way) const {
+    return (way - (at(i, shared) - at(i, from))).length() / edge_[i];
   }
-  return {std::move(ordered), std::move(across), std::move(orientation)};
-}
+  void add_contact(std::vector<Contact>& out, Index i, int own, Index other, Index shared,
+                   double direction_tolerance) const {
+    const Vector way{center_(other, 0) - center_(i, 0), center_(other, 1) - center_(i, 1)};
+    const int a = (own + 1) % CORNERS, b = (own + 2) % CORNERS;
+    const double at_a = direction_misfit(i, own, a, way), at_b = direction_misfit(i, own, b, way);
+    const int place = at_a < at_b ? a : b;
+    // the neighbour's corner `shared` is the lattice's corner `place`; the others follow in the same order
+    const auto back = static_cast<int>((shared + own - place + CORNERS) % CORNERS);
+    const double reverse = direction_misfit(other, shared, back, {-way.x, -way.y});
+    if (std::max(std::min(at_a, at_b), reverse) > direction_tolerance) return;
+    out.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(other),
+                   static_cast<std::int8_t>(step_of(own, place)),
+                   static_cast<std::int8_t>(step_of(static_cast<int>(shared), back))});
+  }
 
-// Sides of the cells' triangles over those at which neighbours just meet; there a face is as large as the
-// triangles of its cells.
-//
-// points (N, 2), ink (N,), corner (N, 3, 2) of the cells; faces (F, 3).
-double swelling_of(View<const double, 2> points, View<const std::uint8_t, 1> ink,
-                   View<const double, 3> corner, View<const std::int32_t, 2> faces,
-                   const CellMeshLimits& limits) {
-  Array<double, 1> ratio({faces.size()});
-  Index count = 0;
-  for (Index f = 0; f < faces.size(); ++f) {
-    const std::int32_t a = faces(f, 0), b = faces(f, 1), c = faces(f, 2);
-    if (!has_three_inks(ink, a, b, c)) continue;
-    const double size = std::abs(doubled_area(points, a, b, c));
-    double total = 0.0;
-    for (const Index i : {a, b, c}) total += std::abs(doubled_area(corner[i], 0, 1, 2));
-    if (size > 0.0 && std::isfinite(total)) ratio[count++] = total / (3.0 * size);
+  View<const double, 2> center_;
+  Array<double, 3> corner_;
+  Array<double, 1> edge_;
+  Array<double, 2> points_;
+};
+
+// The best contact at each step of each cell (N, 6), or -1; only where both cells agree.
+class MutualContacts {
+ public:
+  MutualContacts(const Triangles& triangles, const std::vector<Contact>& contacts, Index cells,
+                 double swelling, double tolerance)
+      : best_({cells, STEPS}, -1), misfit_({cells, STEPS}, tolerance), contacts_(contacts) {
+    for (std::size_t n = 0; n < contacts.size(); ++n) {
+      const Contact& one = contacts[n];
+      const double misfit = triangles.misfit(one, swelling);
+      if (misfit >= misfit_(one.from, one.step)) continue;
+      misfit_(one.from, one.step) = misfit;
+      best_(one.from, one.step) = static_cast<std::int32_t>(n);
+    }
   }
-  if (count == 0) return 1.0;
-  const double root = std::sqrt(numeric::median_of_many(ratio.slice(0, count)));
-  return std::min(std::max(root, 1.0), limits.max_swelling);
+  // The contact at a step; null for none.
+  const Contact* at(Index i, Index step) const {
+    const std::int32_t n = best_(i, step);
+    if (n < 0) return nullptr;
+    const Contact& one = contacts_[static_cast<std::size_t>(n)];
+    const std::int32_t other = best_(one.to, one.back);
+    if (other < 0) return nullptr;
+    const Contact& reverse = contacts_[static_cast<std::size_t>(other)];
+    return reverse.to == i && reverse.back == step ? &one : nullptr;
+  }
+  double misfit(Index i, Index step) const { return misfit_(i, step); }
+
+ private:
+  Array<std::int32_t, 2> best_;
+  Array<double, 2> misfit_;
+  const std::vector<Contact>& contacts_;
+};
+
+// The median swelling at mutual contacts; 1 without any.
+double swelling_of(const Triangles& triangles, const MutualContacts& contacts, Index cells) {
+  std::vector<double> ratios;
+  for (Index i = 0; i < cells; ++i)
+    for (Index k = 0; k < STEPS; ++k)
+      if (const Contact* one = contacts.at(i, k)) ratios.push_back(triangles.swelling(*one));
+  if (ratios.empty()) return 1.0;
+  return numeric::median_of_many(View<double, 1>(ratios.data(), {static_cast<Index>(ratios.size())}));
 }
 
 }  // namespace
 
-CellMesh build_cell_mesh(const MeshedCells& cells, const CellMeshLimits& limits) {
-  const auto center = cells.center_px;
-  auto [faces, neighbours] = numeric::triangulate(center);
-  update_flipped_edges(center, cells.ink, faces, neighbours, limits);
-  const double swelling = swelling_of(center, cells.ink, cells.corner_px, faces, limits);
-  const Array<double, 3> corner = without_swelling(center, cells.corner_px, swelling);
-  ClassifiedFaces found = classify_faces(center, cells.ink, cells.area_px, corner, faces, neighbours, limits);
-  const std::int64_t count = std::count_if(found.orientation.begin(), found.orientation.end(),
-                                           [](std::int8_t turn) { return turn != 0; });
-  return {std::move(found.faces), std::move(found.neighbours), std::move(found.orientation), swelling, count};
-}
-
-Array<double, 3> without_swelling(View<const double, 2> center, View<const double, 3> corner,
-                                  double swelling) {
-  Array<double, 3> out(corner.shape());
-  const auto moved = out.view();
-  for (Index i = 0; i < center.size(); ++i) {
-    const double x = center(i, 0), y = center(i, 1);
-    for (int k = 0; k < 3; ++k) {
-      moved(i, k, 0) = x + (corner(i, k, 0) - x) / swelling;
-      moved(i, k, 1) = y + (corner(i, k, 1) - y) / swelling;
-    }
+CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
+                     const CellMeshLimits& limits) {
+  const Index count = center.size();
+  Array<std::int32_t, 2> neighbours({count, STEPS}, -1);
+  Array<std::int8_t, 2> back({count, STEPS}, std::int8_t{-1});
+  Array<double, 2> misfit({count, STEPS}, 0.0);
+  double swelling = 1.0;
+  if (count > 1) {
+    const Triangles triangles(center, corner);
+    const auto contacts = triangles.contacts(limits.first_tolerance, limits.direction_tolerance);
+    const MutualContacts first(triangles, contacts, count, 1.0, limits.first_tolerance);
+    swelling =
+        std::min(std::max(swelling_of(triangles, first, count), limits.min_swelling), limits.max_swelling);
+    const MutualContacts mutual(triangles, contacts, count, swelling, limits.tolerance);
+    for (Index i = 0; i < count; ++i)
+      for (Index k = 0; k < STEPS; ++k) {
+        const Contact* one = mutual.at(i, k);
+        if (one == nullptr) continue;
+        neighbours(i, k) = one->to;
+        back(i, k) = one->back;
+        misfit(i, k) = mutual.misfit(i, k);
+      }
   }
-  return out;
+  return {std::move(neighbours), std::move(back), std::move(misfit), swelling};
 }
 
 }  // namespace cmp::cells

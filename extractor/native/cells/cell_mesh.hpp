@@ -1,4 +1,4 @@
-// Stage 6: the cell mesh, a triangular mesh through the cells' centers.
+// Stage 6: which cells share a corner, from the cells' triangles alone.
 #pragma once
 
 #include <tuple>
@@ -9,44 +9,27 @@ namespace cmp::cells {
 
 // The limits of the mesh; the Python module explains them.
 struct CellMeshLimits {
-  std::int64_t max_flip_rounds;
-  double min_area_ratio;
-  double max_area_ratio;
-  double max_swelling;
-  double max_corner_gap;
+  double first_tolerance, tolerance, direction_tolerance, min_swelling, max_swelling;
 
   template <class F>
   static CellMeshLimits read(const F& f) {
-    return {f["max_flip_rounds"], f["min_area_ratio"], f["max_area_ratio"], f["max_swelling"],
-            f["max_corner_gap"]};
+    return {f["first_tolerance"], f["tolerance"], f["direction_tolerance"], f["min_swelling"],
+            f["max_swelling"]};
   }
 };
 
-// The image's N colored cells.
-struct MeshedCells {
-  View<const double, 2> center_px;  // (N, 2)
-  View<const std::uint8_t, 1> ink;  // (N,) 1 red, 2 green, 3 blue
-  View<const double, 1> area_px;    // (N,) px^2
-  View<const double, 3> corner_px;  // (N, 3, 2) NaN where the region is no triangle
+inline constexpr Index STEPS = 6;
+// The corners i, j of each step: a neighbour shares corner i with a cell, and has the shared corner where the
+// cell has corner j.
+inline constexpr int STEP_CORNERS[STEPS][2] = {{1, 0}, {0, 1}, {2, 0}, {0, 2}, {1, 2}, {2, 1}};
 
-  template <class F>
-  static MeshedCells read(const F& f) {
-    return {f["center_px"], f["ink"], f["area_px"], f["corner_px"]};
-  }
-};
+// The links of N cells: the cell at each step (N, 6), or -1; the step by which that cell leads back (N, 6);
+// and the distance between the two corners, in edges of the smaller cell (N, 6). Then the swelling: sides of
+// the triangles over those at which neighbours just meet.
+using CellLinks = std::tuple<Array<std::int32_t, 2>, Array<std::int8_t, 2>, Array<double, 2>, double>;
 
-// The mesh of F faces: faces (F, 3), the red, green and blue cell of each, -1 thrice for no face; neighbours
-// (F, 3), the face across the edge opposite to each cell, or -1; orientation (F,), +1 where red, green, blue
-// run clockwise in the image, -1 counter-clockwise, 0 no face; the swelling; and the number of faces that are
-// some.
-using CellMesh =
-    std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 2>, Array<std::int8_t, 1>, double, std::int64_t>;
-
-// The Delaunay triangles of the centers, corrected by color.
-CellMesh build_cell_mesh(const MeshedCells& cells, const CellMeshLimits& limits);
-
-// The corners (N, 3, 2) of cells whose sides are divided by the swelling, around their centers (N, 2).
-Array<double, 3> without_swelling(View<const double, 2> center, View<const double, 3> corner,
-                                  double swelling);
+// center (N, 2), corner (N, 3, 2) clockwise in the image.
+CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
+                     const CellMeshLimits& limits);
 
 }  // namespace cmp::cells

@@ -82,25 +82,25 @@ void fill_moments(View<const std::int32_t, 1> x_of, View<const std::int32_t, 1> 
 
 }  // namespace
 
-GrownRegions grow(View<const std::uint8_t, 3> hsv, View<const std::uint8_t, 2> label,
-                  View<const std::int32_t, 2> seed_xy, View<const std::uint8_t, 1> seed_ink, Index limit_px,
-                  const GrowLimits& limits) {
-  const auto height = label.size(0), width = label.size(1), framed_width = width + 2;
+GrownRegions grow(View<const std::uint8_t, 3> hsv, View<const std::int32_t, 2> seed_xy,
+                  View<const std::int64_t, 1> limit_px, const GrowLimits& limits) {
+  const auto height = hsv.size(0), width = hsv.size(1), framed_width = width + 2;
   Array<std::int32_t, 2> owner({height + 2, framed_width}, 0);
   owner[0].fill(BORDER);
   owner[height + 1].fill(BORDER);
   for (Index y = 1; y <= height; ++y) owner(y, 0) = owner(y, width + 1) = BORDER;
   Array<double, 2> moments({seed_xy.size(), MOMENT_TERMS}, 0.0);
-  Array<std::int32_t, 1> queue({limit_px + 2});   // indices of pixels in the image
-  Array<std::int32_t, 1> framed({limit_px + 2});  // indices of the same pixels in the framed map
+  std::int64_t most = 0;
+  for (const std::int64_t limit : limit_px) most = std::max(most, limit);
+  Array<std::int32_t, 1> queue({most + 2});   // indices of pixels in the image
+  Array<std::int32_t, 1> framed({most + 2});  // indices of the same pixels in the framed map
   const auto owners = owner.flat(), pixels = queue.view(), framed_pixels = framed.view();
-  const auto labels = label.flat();
   const auto colors = hsv.flat();
   const std::array<Index, 4> steps{1, -1, width, -width}, framed_steps{1, -1, framed_width, -framed_width};
   const double limit2 = limits.threshold * limits.threshold;
   for (Index region = 0; region < seed_xy.size(); ++region) {
     const std::int32_t sx = seed_xy(region, 0), sy = seed_xy(region, 1);
-    const std::uint8_t ink = seed_ink[region];
+    const std::int64_t limit = limit_px[region];
     const Index first = sy * width + sx, start = (sy + 1) * framed_width + sx + 1;
     if (owners[start] != 0) continue;
     pixels[0] = static_cast<std::int32_t>(first);
@@ -109,7 +109,7 @@ GrownRegions grow(View<const std::uint8_t, 3> hsv, View<const std::uint8_t, 2> l
     owners[start] = own;
     ColorSums sums(&colors[3 * first]);
     Index begin = 0, end = 1;
-    while (begin < end && end <= limit_px) {
+    while (begin < end && end <= limit) {
       const Index wave_end = end;
       for (Index i = begin; i < wave_end; ++i) {
         for (int side = 0; side < 4; ++side) {
@@ -117,8 +117,7 @@ GrownRegions grow(View<const std::uint8_t, 3> hsv, View<const std::uint8_t, 2> l
           if (owners[to] != 0) continue;
           const Index pixel = pixels[i] + steps[side];
           const std::uint8_t* color = &colors[3 * pixel];
-          const bool is_free = (labels[pixel] == ink) | (labels[pixel] == 0);
-          const bool is_added = is_free & (end <= limit_px) & sums.is_similar(color, limit2);
+          const bool is_added = (end <= limit) & sums.is_similar(color, limit2);
           // a rejected pixel is overwritten: in noise, a branch would be unpredictable
           pixels[end] = static_cast<std::int32_t>(pixel);
           framed_pixels[end] = static_cast<std::int32_t>(to);
@@ -130,7 +129,7 @@ GrownRegions grow(View<const std::uint8_t, 3> hsv, View<const std::uint8_t, 2> l
       begin = wave_end;
       sums.update_means(end);
     }
-    if (end > limit_px) continue;  // a leak or the background: no cell is that large
+    if (end > limit) continue;  // a leak or the background: no cell is that large
     update_to_coordinates(pixels, framed_pixels, end, static_cast<std::int32_t>(width));
     fill_moments(pixels, framed_pixels, end, sx, sy, moments[region]);
   }

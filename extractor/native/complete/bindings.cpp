@@ -24,7 +24,6 @@ void add_complete(nb::module_ module) {
   bind<&repair_markers>(module, "repair_markers", {"refined", "places", "tables", "size", "limits"});
   bind<&locate_on_edges>(module, "locate_on_edges", {"markers", "scatter", "topology", "points", "limits"});
   bind<&measure_jumps>(module, "measure_jumps", {"markers", "topology", "limits"});
-  bind<&measure_cells>(module, "measure_cells", {"view", "center", "color", "edge_px", "limits"});
   bind<&measure_numbered>(module, "measure_numbered", {"view", "cells", "xy", "edges", "limits"});
 }
 

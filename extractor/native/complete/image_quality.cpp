@@ -157,8 +157,8 @@ Array<double, 2> centers(View<const double, 2> xy, View<const std::int32_t, 2> c
   return out;
 }
 
-}  // namespace
-
+// Contrast, the two inks that differ least, clipping and evenness at the middles of cells (K, 2) px; NaN
+// where unknown.
 CellFigures measure_cells(const image::PyramidLevel& view, View<const double, 2> center,
                           View<const std::uint8_t, 1> color, double edge_px, const QualityLimits& limits) {
   const auto light = view.response.light;
@@ -169,6 +169,8 @@ CellFigures measure_cells(const image::PyramidLevel& view, View<const double, 2>
   const double clipping = static_cast<double>(cells.clipped) / static_cast<double>(cells.colored());
   return {contrast, one, other, clipping, evenness(cells, median, light, limits.dim_quantile)};
 }
+
+}  // namespace
 
 std::tuple<CellFigures, double, double> measure_numbered(const image::PyramidLevel& view,
                                                          const SampledCells& cells, View<const double, 2> xy,

@@ -42,11 +42,4 @@ std::tuple<CellFigures, double, double> measure_numbered(const image::PyramidLev
                                                          View<const std::int32_t, 2> edges,
                                                          const QualityLimits& limits);
 
-// Contrast, the two inks that differ least, clipping and evenness at the middles of cells; NaN where unknown.
-//
-// The image has no gaps between its rows. center (K, 2) px, NaN where unknown; color (K,) red 0, green 1,
-// blue 2, black 3; edge_px, the length of the cells' edges.
-CellFigures measure_cells(const image::PyramidLevel& view, View<const double, 2> center,
-                          View<const std::uint8_t, 1> color, double edge_px, const QualityLimits& limits);
-
 }  // namespace cmp::complete

@@ -12,11 +12,6 @@ inline constexpr int NEIGHBOURS = 6;
 // (6, 2) axial steps from a marker to its neighbours; as in extractor/layout/lattice.py.
 inline constexpr Index NEIGHBOUR_STEPS[NEIGHBOURS][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};
 
-// A place of the lattice.
-struct AxialPlace {
-  Index q, r;
-};
-
 // The layer of the marker at the axial (q, r).
 inline Index layer_of(Index q, Index r) {
   const Index sum = q + r;
@@ -38,28 +33,6 @@ inline Index marker_id(Index q, Index r) {
     i = 4 * k - q;
   }
   return 3 * k * (k - 1) + 1 + i;
-}
-
-// The axial place of a cell after a rotation of the lattice by `turn` (0, 1, 2) times 120 degrees.
-//
-// The rotation maps the three cells around the down-cell (turn, 0) to the cells around (0, 0). Inks are
-// mapped onto themselves when the lattice is also shifted so that (q - r) mod 3 agrees.
-inline AxialPlace rotated_cell(Index q, Index r, Index turn) {
-  q -= turn;
-  if (turn == 1) return {-q - r - 1, q + 1};
-  if (turn == 2) return {r - 1, -q - r};
-  return {q, r};
-}
-
-// (N, 2) the axial coordinates of cells (N, 2) after rotated_cell.
-inline Array<std::int32_t, 2> rotated_cells(View<const std::int32_t, 2> axial, Index turn) {
-  Array<std::int32_t, 2> out(axial.shape());
-  for (Index i = 0; i < axial.size(); ++i) {
-    const AxialPlace place = rotated_cell(axial(i, 0), axial(i, 1), turn);
-    out(i, 0) = static_cast<std::int32_t>(place.q);
-    out(i, 1) = static_cast<std::int32_t>(place.r);
-  }
-  return out;
 }
 
 }  // namespace cmp::layout

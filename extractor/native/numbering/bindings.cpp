@@ -1,27 +1,27 @@
 // Room "numbering" for Python.
 #include "base/binding.hpp"
 
+#include "numbering/ink_fields.hpp"
 #include "numbering/lattice_walk.hpp"
+#include "numbering/link_inks.hpp"
 #include "numbering/marker_places.hpp"
-#include "numbering/mesh_parts.hpp"
-#include "numbering/outline_fit.hpp"
-#include "numbering/small_pattern.hpp"
-#include "numbering/white_search.hpp"
+#include "numbering/missing_cells.hpp"
+#include "numbering/part_attachment.hpp"
+#include "numbering/registration.hpp"
 
 namespace cmp::numbering {
 
 void add_numbering(nb::module_ module) {
-  bind<&faces_by_component>(module, "faces_by_component", {"neighbours", "orientation"});
-  bind<&marker_turn_by_brightness>(module, "marker_turn_by_brightness",
-                                   {"image", "center", "faces", "orientation", "limits"});
-  bind<&walk_component>(
-      module, "walk_component",
-      {"center", "faces", "neighbours", "orientation", "component", "front", "reach", "limits"});
-  bind<&count_meshed_cells>(module, "count_meshed_cells", {"faces", "orientation", "count"});
-  bind<&align>(module, "align", {"axial", "layout_axial", "cell_lookup", "limits"});
-  bind<&search_white_cell>(module, "search_white_cell", {"image", "cells", "axial", "layout", "limits"});
-  bind<&predicted_corners>(module, "predicted_corners",
-                           {"center_px", "cell", "layout", "mirrored", "limits"});
+  bind<&walk_cells>(module, "walk_cells", {"links", "limits"});
+  bind<&cell_light>(module, "cell_light", {"view", "center", "corner"});
+  bind<&contradicted_links>(module, "contradicted_links", {"links", "light", "limits"});
+  bind<&ink_fields>(module, "ink_fields", {"view", "cells", "light", "part", "limits"});
+  bind<&register_part>(module, "register_part",
+                       {"axial", "naming", "white_axial", "white", "layout", "limits"});
+  bind<&moved_cells>(module, "moved_cells", {"axial", "turn", "dq", "dr", "cell_lookup"});
+  bind<&attach_parts>(module, "attach_parts",
+                      {"cells", "cell", "odds", "layout", "axial", "cell_lookup", "limits"});
+  bind<&missing_cells>(module, "missing_cells", {"center", "cell", "layout", "limits"});
   bind<&merge_corners>(module, "merge_corners",
                        {"cells", "numbers", "layout", "corner_ids", "markers", "limits"});
 }

@@ -1,138 +1,146 @@
 #include "numbering/lattice_walk.hpp"
 
-#include <cstdlib>
+#include <queue>
+#include <set>
+#include <vector>
 
+#include "cells/cell_mesh.hpp"
 #include "layout/lattice_tables.hpp"
-#include "numbering/mesh_parts.hpp"
+#include "numbering/lattice_motion.hpp"
+#include "numbering/link_bridges.hpp"
 
 namespace cmp::numbering {
 
 namespace {
 
+using cells::STEP_CORNERS;
+using cells::STEPS;
 using layout::UNKNOWN_AXIAL;
 
-struct Mesh {
-  View<const std::int32_t, 2> faces, neighbours;
-  View<const std::int8_t, 1> orientation;
-  int front;  // orientation of the faces that are markers
+constexpr int CORNER_AXIAL[3][2] = {{0, 0}, {1, 0}, {0, 1}};  // of an up-cell, as in the conventions
+
+// The axial step of link j of a cell whose corner `first` is corner 0.
+AxialStep axial_step(Index j, int first) {
+  const auto [a, b] = STEP_CORNERS[j];
+  const int *from = CORNER_AXIAL[(a + 3 - first) % 3], *to = CORNER_AXIAL[(b + 3 - first) % 3];
+  return {from[0] - to[0], from[1] - to[1]};
+}
+
+// A cell that can be reached; the best link is followed first.
+struct Reached {
+  double misfit;
+  std::int32_t cell;
+  AxialStep place;
+  int first;
+
+  friend bool operator>(const Reached& a, const Reached& b) {
+    return a.misfit != b.misfit ? a.misfit > b.misfit : a.cell > b.cell;
+  }
 };
 
-// A walk over all cells that are connected with one face.
 class Walk {
  public:
-  Walk(const Mesh& mesh, View<const bool, 1> blocked, std::int32_t reach)
-      : mesh_(mesh),
+  Walk(const CellLinks& links, View<const bool, 1> blocked)
+      : links_(links),
         blocked_(blocked),
-        reach_(reach),
         axial_({blocked.size(), 2}, UNKNOWN_AXIAL),
-        bad_({blocked.size()}, false),
-        lookup_({2 * reach + 1, 2 * reach + 1}, -1),
-        queue_({mesh.faces.size()}),
-        is_queued_({mesh.faces.size()}, false) {}
+        first_({blocked.size()}, std::int8_t{0}),
+        part_({blocked.size()}, -1) {}
 
-  void walk_from(std::int64_t start) {
-    place_first_face(start);
-    add_to_queue(static_cast<std::int32_t>(start));
-    for (Index begin = 0; begin < end_; ++begin) {
-      const std::int32_t face = queue_[begin];
-      for (int k = 0; k < 3; ++k) {
-        const std::int32_t across = mesh_.neighbours(face, k);
-        if (across >= 0 && place_fourth_cell(face, k, mesh_.faces(across, k)) && !is_queued_[across])
-          add_to_queue(across);
+  // Walks over all cells, in parts that begin at the cells with the most links.
+  void walk_all() {
+    const Index count = blocked_.size();
+    std::vector<std::vector<std::int32_t>> by_links(STEPS + 1);
+    for (Index i = 0; i < count; ++i) {
+      Index links = 0;
+      for (Index j = 0; j < STEPS; ++j) links += links_.neighbours(i, j) >= 0;
+      by_links[static_cast<std::size_t>(links)].push_back(static_cast<std::int32_t>(i));
+    }
+    for (Index links = STEPS; links > 0; --links)
+      for (const std::int32_t start : by_links[static_cast<std::size_t>(links)])
+        if (part_[start] < 0 && !blocked_[start]) walk_from(start);
+  }
+  // Marks the cells at the links that contradict the walk; returns how many links these are.
+  std::int64_t update_contradicted(View<bool, 1> bad) const {
+    std::int64_t count = 0;
+    for (Index i = 0; i < part_.size(); ++i) {
+      if (part_[i] < 0) continue;
+      for (Index j = 0; j < STEPS; ++j) {
+        const std::int32_t to = links_.neighbours(i, j);
+        if (to < i || part_[to] != part_[i]) continue;
+        const AxialStep step = axial_step(j, first_[i]);
+        if (axial_(to, 0) == axial_(i, 0) + step.q && axial_(to, 1) == axial_(i, 1) + step.r) continue;
+        bad[i] = bad[to] = true;
+        ++count;
       }
     }
+    return count;
   }
-  bool is_contradicted() const {
-    const auto bad = bad_.view();
-    return std::find(bad.begin(), bad.end(), true) != bad.end();
+  // Parts are what hangs together by loops of links: a single link may be false, and joins nothing.
+  void part_at_bridges() { part_ = parts_without_bridges(links_, part_); }
+  Walked result(std::int64_t contradictions) && {
+    return {std::move(axial_), std::move(first_), std::move(part_), contradictions};
   }
-  View<const bool, 1> contradicted() const { return bad_; }
-  Array<std::int32_t, 2>& axial() { return axial_; }
 
  private:
-  void add_to_queue(std::int32_t face) {
-    queue_[end_++] = face;
-    is_queued_[face] = true;
+  void walk_from(std::int32_t start) {
+    std::priority_queue<Reached, std::vector<Reached>, std::greater<>> waiting;
+    std::set<std::pair<std::int32_t, std::int32_t>> taken;
+    waiting.push({0.0, start, {0, 0}, 0});
+    while (!waiting.empty()) {
+      const Reached here = waiting.top();
+      waiting.pop();
+      if (part_[here.cell] >= 0 || !taken.insert({here.place.q, here.place.r}).second) continue;
+      axial_(here.cell, 0) = here.place.q, axial_(here.cell, 1) = here.place.r;
+      first_[here.cell] = static_cast<std::int8_t>(here.first);
+      part_[here.cell] = parts_;
+      for (Index j = 0; j < STEPS; ++j) {
+        const std::int32_t to = links_.neighbours(here.cell, j);
+        if (to < 0 || part_[to] >= 0 || blocked_[to]) continue;
+        const AxialStep step = axial_step(j, here.first);
+        const int first = first_corner(links_.back(here.cell, j), {-step.q, -step.r});
+        if (first < 0) continue;
+        waiting.push({std::max(here.misfit, links_.misfit(here.cell, j)),
+                      to,
+                      {here.place.q + step.q, here.place.r + step.r},
+                      first});
+      }
+    }
+    ++parts_;
   }
-  // around marker (0, 0) red is (0, 0), green (0, -1), blue (-1, 0); around the white cell green is (-1, 1)
-  void place_first_face(std::int64_t face) {
-    const bool is_marker = mesh_.orientation[face] == mesh_.front;
-    for (int k = 0; k < 3; ++k) {
-      const std::int32_t i = mesh_.faces(face, k);
-      axial_(i, 0) = k == 0 || (k == 1 && is_marker) ? 0 : -1;
-      axial_(i, 1) = k != 1 ? 0 : is_marker ? -1 : 1;
-      lookup_(axial_(i, 0) + reach_, axial_(i, 1) + reach_) = i;
-    }
-  }
-  // Places the cell across the edge of a face opposite to its cell k; false where it is not walked to.
-  bool place_fourth_cell(std::int32_t face, int k, std::int32_t cell) {
-    if (blocked_[cell]) return false;
-    const std::int32_t a = mesh_.faces(face, (k + 1) % 3), b = mesh_.faces(face, (k + 2) % 3);
-    const std::int32_t c = mesh_.faces(face, k);
-    const std::int32_t q = axial_(a, 0) + axial_(b, 0) - axial_(c, 0);
-    const std::int32_t r = axial_(a, 1) + axial_(b, 1) - axial_(c, 1);
-    if (axial_(cell, 0) != UNKNOWN_AXIAL) {
-      if (axial_(cell, 0) == q && axial_(cell, 1) == r) return true;
-      bad_[cell] = true;
-      return false;
-    }
-    if (std::abs(q) > reach_ || std::abs(r) > reach_) return false;
-    std::int32_t& owner = lookup_(q + reach_, r + reach_);
-    if (owner >= 0) {
-      bad_[cell] = true;
-      bad_[owner] = true;
-      return false;
-    }
-    axial_(cell, 0) = q;
-    axial_(cell, 1) = r;
-    owner = cell;
-    return true;
+  // The corner that is corner 0 of a cell whose link j is this axial step; -1 if there is none.
+  static int first_corner(Index j, AxialStep step) {
+    for (int first = 0; first < 3; ++first)
+      if (axial_step(j, first) == step) return first;
+    return -1;
   }
 
-  const Mesh& mesh_;
+  const CellLinks& links_;
   View<const bool, 1> blocked_;
-  std::int32_t reach_;
   Array<std::int32_t, 2> axial_;
-  Array<bool, 1> bad_;
-  Array<std::int32_t, 2> lookup_;
-  Array<std::int32_t, 1> queue_;
-  Array<bool, 1> is_queued_;
-  Index end_ = 0;
+  Array<std::int8_t, 1> first_;
+  Array<std::int32_t, 1> part_;
+  std::int32_t parts_ = 0;
 };
 
 }  // namespace
 
-std::tuple<Array<std::int32_t, 2>, std::int64_t, std::int64_t> walk_component(
-    View<const double, 2> center, View<const std::int32_t, 2> faces, View<const std::int32_t, 2> neighbours,
-    View<const std::int8_t, 1> orientation, View<const std::int64_t, 1> component, int front,
-    std::int32_t reach, const WalkLimits& limits) {
-  const Mesh mesh{faces, neighbours, orientation, front};
-  Array<bool, 1> blocked({center.size()}, false);
-  for (Index round = 0; round < limits.max_rounds; ++round) {
-    const std::int64_t start = most_central_face(center, faces, component, blocked);
-    if (start < 0) break;
-    Walk walk(mesh, blocked, reach);
-    walk.walk_from(start);
-    if (!walk.is_contradicted()) {
-      std::int64_t walked = 0;
-      for (Index i = 0; i < center.size(); ++i) walked += walk.axial()(i, 0) != UNKNOWN_AXIAL;
-      return {std::move(walk.axial()), walked, std::count(blocked.begin(), blocked.end(), true)};
+Walked walk_cells(const CellLinks& links, const WalkLimits& limits) {
+  const Index count = links.neighbours.size();
+  Array<bool, 1> blocked({count}, false);
+  std::int64_t contradictions = 0;
+  for (Index round = 0;; ++round) {
+    Walk walk(links, blocked);
+    walk.walk_all();
+    Array<bool, 1> bad(blocked.view());
+    const std::int64_t here = walk.update_contradicted(bad);
+    contradictions += here;
+    if (here == 0 || round >= limits.max_rounds) {
+      walk.part_at_bridges();
+      return std::move(walk).result(contradictions);
     }
-    const auto bad = walk.contradicted();
-    for (Index i = 0; i < bad.size(); ++i) blocked[i] |= bad[i];
+    blocked = std::move(bad);
   }
-  return {Array<std::int32_t, 2>({center.size(), 2}, UNKNOWN_AXIAL), 0,
-          std::count(blocked.begin(), blocked.end(), true)};
-}
-
-std::int64_t count_meshed_cells(View<const std::int32_t, 2> faces, View<const std::int8_t, 1> orientation,
-                                Index count) {
-  Array<bool, 1> has_face({count}, false);
-  const auto is_meshed = has_face.view();
-  for (Index f = 0; f < orientation.size(); ++f)
-    if (orientation[f] != 0)
-      for (int k = 0; k < 3; ++k) is_meshed[faces(f, k)] = true;
-  return std::count(has_face.begin(), has_face.end(), true);
 }
 
 }  // namespace cmp::numbering

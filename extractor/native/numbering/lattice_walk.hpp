@@ -1,4 +1,4 @@
-// Stage 7: numbers the cells by their places in the lattice, walking from face to face of the cell mesh.
+// Stage 7, the spin-search algorithm (SSA): walks from cell to cell around their common corners.
 #pragma once
 
 #include <tuple>
@@ -7,9 +7,9 @@
 
 namespace cmp::numbering {
 
-// Limits of a walk; explained in extractor/numbering/lattice_walk.py.
+// The limits of a walk; the Python module explains them.
 struct WalkLimits {
-  Index max_rounds;
+  std::int64_t max_rounds;
 
   template <class F>
   static WalkLimits read(const F& f) {
@@ -17,19 +17,26 @@ struct WalkLimits {
   }
 };
 
-// Walks a component from its middle; contradicted cells are left out and the walk is repeated.
-//
-// center (N, 2) px, the cells' centers; faces (F, 3), neighbours (F, 3), orientation (F,) of the cell mesh;
-// component (K,), its faces; front, the orientation of the faces that are markers; reach, the largest axial
-// coordinate. The axial coordinates (N, 2), UNKNOWN_AXIAL for cells not walked to, the numbers of cells
-// walked to and left out; no cells if contradictions remain.
-std::tuple<Array<std::int32_t, 2>, std::int64_t, std::int64_t> walk_component(
-    View<const double, 2> center, View<const std::int32_t, 2> faces, View<const std::int32_t, 2> neighbours,
-    View<const std::int8_t, 1> orientation, View<const std::int64_t, 1> component, int front,
-    std::int32_t reach, const WalkLimits& limits);
+// The links of N cells; see cells/cell_mesh.hpp.
+struct CellLinks {
+  View<const std::int32_t, 2> neighbours;  // (N, 6)
+  View<const std::int8_t, 2> back;         // (N, 6)
+  View<const double, 2> misfit;            // (N, 6)
 
-// The number of cells, of `count`, that have a face.
-std::int64_t count_meshed_cells(View<const std::int32_t, 2> faces, View<const std::int8_t, 1> orientation,
-                                Index count);
+  template <class F>
+  static CellLinks read(const F& f) {
+    return {f["neighbours"], f["back"], f["misfit"]};
+  }
+};
+
+// (N, 2) axial coordinates of the cells, (N,) the corner that is corner 0, (N,) the part, or -1 for a cell
+// without consistent links; and the number of links that contradicted the walk.
+//
+// Every part has a frame of its own. Corner 1 follows corner 0 clockwise in the image: the coordinates are
+// those of a pattern seen from its back.
+using Walked =
+    std::tuple<Array<std::int32_t, 2>, Array<std::int8_t, 1>, Array<std::int32_t, 1>, std::int64_t>;
+
+Walked walk_cells(const CellLinks& links, const WalkLimits& limits);
 
 }  // namespace cmp::numbering

@@ -3,7 +3,6 @@
 
 #include "base/processor.hpp"
 #include "numeric/bilinear.hpp"
-#include "numeric/delaunay.hpp"
 #include "numeric/gaussian.hpp"
 #include "numeric/median.hpp"
 #include "numeric/nearest_points.hpp"
@@ -27,7 +26,6 @@ Array<std::int32_t, 2> nearest_points(View<const double, 2> xy, View<const doubl
 }  // namespace
 
 void add_numeric(nb::module_ module) {
-  bind<&delaunay>(module, "delaunay", {"points"});
   bind<&fill_patch_mean>(module, "fill_patch_mean", {"flat", "height", "width", "x", "y", "radius", "out"});
   bind<&nearest_points>(module, "nearest_points", {"xy", "queries", "count"});
   bind<&select>(module, "select", {"values", "place"});

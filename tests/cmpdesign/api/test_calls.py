@@ -165,7 +165,7 @@ def test_values_show_themselves(design: cmpdesign.Design, image: np.ndarray) -> 
     named = cmpdesign.load("honeycomb", name="<script>")
     assert "<script>" not in named._repr_html_()
     nothing = Extractor(design.layout).extract(np.full((100, 100, 3), 90, np.uint8))
-    assert "no_color" in repr(nothing) and "white light" in nothing._repr_html_()
+    assert "no_color" in repr(nothing) and "light that shows all inks" in nothing._repr_html_()
     rendered = cmpdesign.render(design.layout, pitch_px=30)
     for value in (rendered, rendered.truth, Tracker(design.layout).track(image)):
         assert len(repr(value)) < 120 and type(value).__name__ in repr(value) and "37" in repr(value)

@@ -73,16 +73,13 @@ def test_one_cell_of_another_color_is_found_out() -> None:
 
 
 def test_the_other_side_is_found_out() -> None:
-    rendered = picture(mirrored=True)
-    verdict = judge_markers(
-        reference(), rendered.image, markers_at(rendered.truth.marker_xy_px, mirrored=True)
-    )
-    assert verdict.reason == (
-        "the pattern is seen from the back, but designed to be seen from the front: "
-        "a mirrored camera or the pad's other face, by the hues of the inks"
-    )
+    image = picture(mirrored=True).image
     either = Extractor(reference(), side="either")
-    assert verify(either, reference(), rendered.image).reason == verdict.reason
+    seen = "the pattern is seen from the back, but designed to be seen from the front"
+    assert verify(either, reference(), image).reason == (
+        f"{seen}: a mirrored camera or the pad's other face, by the colors of the inks"
+    )
+    assert "red and blue are swapped" in str(verify(either, reference(), image[:, ::-1, ::-1]).reason)
 
 
 @pytest.mark.parametrize(("lost", "verified"), [(6, True), (7, False)])

@@ -17,7 +17,7 @@ import pytest
 
 import cmpdesign
 from cmpdesign.products.drawing.svg import layout_to_svg
-from docs.figures.screens import browser, chromium, served
+from docs.figures.screens import FLAGS, browser, chromium, served
 
 pytestmark = [
     pytest.mark.slow,
@@ -192,7 +192,7 @@ def test_good_and_bad_pictures(page: Any, tmp_path: Path) -> None:
     assert page.locator(".stages button").count() > 3
 
 
-def test_200_frames_of_a_camera_against_the_truth(address: str, tmp_path: Path) -> None:
+def test_200_frames_of_a_camera_against_the_truth(chrome: Any, address: str, tmp_path: Path) -> None:
     """Chromium's camera is a file of rendered frames; the page's markers are compared with the frames' truth."""
     layout = cmpdesign.load("tac3d").layout
     rendered = [cmpdesign.render(layout, pitch_px=18, press_mm=0.1 * k, noise=1, seed=k) for k in range(6)]
@@ -204,8 +204,9 @@ def test_200_frames_of_a_camera_against_the_truth(address: str, tmp_path: Path) 
         f"--use-file-for-fake-video-capture={tmp_path}/camera.mjpeg",
     )
     frames: list[dict[str, Any]] = []
-    with browser(*flags) as chrome:
-        page = chrome.new_page()
+    options = {"executable_path": chromium(), "args": [*FLAGS, *flags]}
+    with chrome.browser_type.launch(**options) as with_camera:
+        page = with_camera.new_page()
         page.on(
             "websocket",
             lambda socket: socket.on("framereceived", lambda text: frames.append(json.loads(text))),

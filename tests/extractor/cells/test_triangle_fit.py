@@ -12,8 +12,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from extractor.cells.cells import Cells
 from extractor.cells.region_growing import Regions
-from extractor.cells.triangle_fit import fit_triangles
+from extractor.cells.triangle_fit import fit_edges, regions_as_cells
 from extractor.image.pyramid import PyramidLevel
 from tests.support.pictures import extractor, srgb_light, srgb_values
 
@@ -47,10 +48,21 @@ def region_of(mask: NDArray[np.bool_]) -> Regions:
     terms = (u**0, u, v, u * u, u * v, v * v, u**3, u * u * v, u * v * v, v**3)
     return Regions(
         region_map=mask.astype(np.int32),
-        ink=np.array([1], np.uint8),
         seed=seed[None].astype(np.int32),
         moments=np.array([[term.sum() for term in terms]]),
     )
+
+
+def triangle_of(view: PyramidLevel, mask: NDArray[np.bool_]) -> Points:
+    """(3, 2) the triangle with the moments of a mask in a view, NaN if its shape is no triangle's."""
+    nothing = np.full((1, 3, 2), np.nan)
+    seed = Cells(np.zeros((1, 2)), np.zeros(1), nothing, np.zeros(1), np.zeros(1))
+    return regions_as_cells(seed, region_of(mask), view).corner_px[0]
+
+
+def measured(view: PyramidLevel, corners: Points) -> Points:
+    """(3, 2) the triangle by its edges in the image at full scale."""
+    return fit_edges(view, corners[None])[0]
 
 
 def view_of(image: NDArray[np.uint8]) -> PyramidLevel:
@@ -88,11 +100,11 @@ def test_any_triangle_is_found_to_a_fraction_of_a_pixel(seed: int, size_px: floa
     )
     assume(angles_deg(corners).min() > 30)
     cover = coverage(corners, 100)
-    found = fit_triangles(picture_of(cover, blur_px), region_of(cover > 0.5))
-    assert len(found.ink) == 1 and found.region[0] == 0
+    view = picture_of(cover, blur_px)
+    found = measured(view, triangle_of(view, cover > 0.5))
     # a start for the refinement: edges to a fraction of a pixel, corners farther the sharper they are
-    assert distance_px(found.corner_px[0], corners) < 0.8 / np.sin(np.radians(angles_deg(corners).min()))
-    a, b, c = found.corner_px[0]
+    assert distance_px(found, corners) < 0.8 / np.sin(np.radians(angles_deg(corners).min()))
+    a, b, c = found
     assert (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0] > 0  # clockwise with y down
 
 
@@ -102,8 +114,8 @@ def test_an_equilateral_triangle_follows_sub_pixel_shifts(shift_px: float, turn_
     angle = np.radians(turn_deg + 120 * np.arange(3))
     corners = 30 + shift_px + 13 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     cover = coverage(corners, 62)
-    found = fit_triangles(picture_of(cover, 0.8), region_of(cover > 0.5))
-    assert distance_px(found.corner_px[0], corners) < 0.35
+    view = picture_of(cover, 0.8)
+    assert distance_px(measured(view, triangle_of(view, cover > 0.5)), corners) < 0.35
 
 
 @pytest.mark.parametrize("scale", [2, 3])
@@ -112,8 +124,9 @@ def test_regions_of_a_reduced_image_give_full_scale_corners(scale: int) -> None:
     corners = 60.3 + 40 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     cover = coverage(corners, 120)
     small = cover.reshape(120 // scale, scale, 120 // scale, scale).mean(axis=(1, 3))
-    found = fit_triangles(picture_of(cover, 1.0), region_of(small > 0.5), scale)
-    assert distance_px(found.corner_px[0], corners) < 0.35
+    view = picture_of(cover, 1.0)
+    found = measured(view, triangle_of(view._replace(scale=scale), small > 0.5))
+    assert distance_px(found, corners) < 0.35
 
 
 SHAPES = {
@@ -129,19 +142,17 @@ SHAPES = {
 def test_what_is_no_triangle_is_dropped(shape: str) -> None:
     y, x = np.mgrid[-32:32, -32:32]
     mask = SHAPES[shape](x, y)
-    assert len(fit_triangles(picture_of(mask.astype(np.float64), 0.7), region_of(mask)).ink) == 0
+    assert np.isnan(triangle_of(picture_of(mask.astype(np.float64), 0.7), mask)).all()
 
 
 def test_a_triangle_without_contrast_is_dropped() -> None:
-    """The labels form a triangle, and the image has no edge there."""
+    """The region is a triangle, and the image has no edge there."""
     corners = np.array([[12.0, 40.0], [32.0, 10.0], [50.0, 42.0]])
-    flat = np.full((64, 64, 3), 60, np.uint8)
-    assert len(fit_triangles(view_of(flat), region_of(coverage(corners, 64) > 0.5)).ink) == 0
+    view = view_of(np.full((64, 64, 3), 60, np.uint8))
+    found = triangle_of(view, coverage(corners, 64) > 0.5)
+    assert distance_px(found, corners) < 1.0
+    assert np.isnan(measured(view, found)).all()
 
 
-def test_no_regions_no_triangles() -> None:
-    none = Regions(
-        np.zeros((20, 20), np.int32), np.zeros(0, np.uint8), np.zeros((0, 2), np.int32), np.zeros((0, 10)),
-    )  # fmt: skip
-    found = fit_triangles(view_of(np.zeros((20, 20, 3), np.uint8)), none)
-    assert found.corner_px.shape == (0, 3, 2) and len(found.region) == 0
+def test_no_cells_no_triangles() -> None:
+    assert fit_edges(view_of(np.zeros((20, 20, 3), np.uint8)), np.zeros((0, 3, 2))).shape == (0, 3, 2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import cv2
 import numpy as np
 import pytest
@@ -46,8 +48,10 @@ def test_numbers_at_every_rotation(pattern: str, rotation_deg: int, mirrored: bo
     assert_numbered_as_the_layout(markers, seen.truth.marker_xy_px, 1.0)
 
 
-@pytest.mark.parametrize("layers", [1, 2, 3, 9])
-@pytest.mark.parametrize("pattern", TRIANGULAR)
+# an elliptical pattern of one layer has three cells, of which two do not meet where the white cell blurs their corner
+@pytest.mark.parametrize(
+    ("pattern", "layers"), [*product(TRIANGULAR, [2, 3, 9]), ("honeycomb", 1), ("round", 1)]
+)
 def test_numbers_of_few_and_of_many_layers(pattern: str, layers: int) -> None:
     pitch_px = 26.0 if layers < 5 else 14.0
     seen = picture(pattern, layers, pitch_px=pitch_px)

@@ -1,0 +1,1 @@
+"""Parts of coded pads, registered by their cells and bits."""

@@ -1,0 +1,5 @@
+"""``python -m benchmarks.pad_codes``."""
+
+from benchmarks.pad_codes.parts import main
+
+main()

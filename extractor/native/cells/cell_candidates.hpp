@@ -1,0 +1,42 @@
+// The cells of an image: the triangles of the component trees of its contrast maps.
+#pragma once
+
+#include <tuple>
+
+#include "base/array.hpp"
+#include "cells/moments.hpp"
+
+namespace cmp::cells {
+
+// The limits of cells; the Python module explains them.
+struct CandidateLimits {
+  ShapeLimits shape;
+  double min_area_px, max_area_share, same_place, min_contrast_deviations, level_weight;
+  std::int64_t tile_px;
+
+  template <class F>
+  static CandidateLimits read(const F& f) {
+    return {f["shape"],
+            f["min_area_px"],
+            f["max_area_share"],
+            f["same_place"],
+            f["min_contrast_deviations"],
+            f["level_weight"],
+            f["tile_px"]};
+  }
+};
+
+// centers (N, 2), areas (N,), corners (N, 3, 2) clockwise in the image, qualities (N,) and heights (N,) over
+// the surroundings, in steps of the map.
+using FoundCandidates =
+    std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 3>, Array<double, 1>, Array<double, 1>>;
+
+// Cells of the image (H, W, 3), by the contrast maps from `first` on, `count` of them, and by those that
+// were found before; of several at one place the one with the best shape.
+FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index first, Index count,
+                                View<const double, 1> shares, View<const double, 2> center,
+                                View<const double, 1> area, View<const double, 3> corner,
+                                View<const double, 1> quality, View<const double, 1> height,
+                                const CandidateLimits& limits);
+
+}  // namespace cmp::cells

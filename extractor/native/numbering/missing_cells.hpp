@@ -1,0 +1,32 @@
+// The places of cells that were not found, by the cells around.
+#pragma once
+
+#include <tuple>
+
+#include "base/array.hpp"
+#include "layout/lattice_tables.hpp"
+#include "localmap/local_map.hpp"
+
+namespace cmp::numbering {
+
+// The limits of predictions; the Python module explains them.
+struct MissingCellLimits {
+  localmap::MapPrior prior;
+  std::int64_t min_neighbours;
+
+  template <class F>
+  static MissingCellLimits read(const F& f) {
+    return {f["prior"], f["min_neighbours"]};
+  }
+};
+
+// The layout's cells (K,) without a cell of the image that have enough neighbours with one, and their corners
+// (K, 3, 2) px, in the layout's order.
+//
+// center (N, 2) and cell (N,) of the image's cells; layout, the layout's cells.
+std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const double, 2> center,
+                                                                   View<const std::int32_t, 1> cell,
+                                                                   const layout::LayoutCells& layout,
+                                                                   const MissingCellLimits& limits);
+
+}  // namespace cmp::numbering

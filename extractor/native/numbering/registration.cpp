@@ -1,0 +1,127 @@
+#include "numbering/registration.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include "layout/lattice_tables.hpp"
+#include "numbering/lattice_motion.hpp"
+
+namespace cmp::numbering {
+
+namespace {
+
+struct Extent {
+  std::int32_t low, high;
+};
+
+// The extent of q, r or q + r over places, without a share of them at both ends.
+Extent trimmed_extent(const std::vector<AxialStep>& places, int axis, double share) {
+  std::vector<std::int32_t> values;
+  values.reserve(places.size());
+  for (const AxialStep& a : places) values.push_back(axis == 0 ? a.q : axis == 1 ? a.r : a.q + a.r);
+  std::sort(values.begin(), values.end());
+  const auto cut = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+  return {values[cut], values[values.size() - 1 - cut]};
+}
+
+struct ScoredMotion {
+  Motion motion;
+  double score;
+  std::int64_t inside;
+  double white;
+};
+
+// The log odds of white over black by axial place.
+class WhitePlaces {
+ public:
+  WhitePlaces(View<const std::int32_t, 2> axial, View<const double, 1> odds) : odds_(odds) {
+    for (Index n = 0; n < axial.size(); ++n) {
+      const std::int32_t reach = std::max(std::abs(axial(n, 0)), std::abs(axial(n, 1)));
+      reach_ = std::max(reach_, reach);
+    }
+    lookup_ = Array<std::int32_t, 2>({2 * reach_ + 1, 2 * reach_ + 1}, -1);
+    for (Index n = 0; n < axial.size(); ++n)
+      lookup_(axial(n, 0) + reach_, axial(n, 1) + reach_) = static_cast<std::int32_t>(n);
+  }
+  double at(AxialStep a) const {
+    if (std::abs(a.q) > reach_ || std::abs(a.r) > reach_) return 0.0;
+    const std::int32_t n = lookup_(a.q + reach_, a.r + reach_);
+    return n < 0 || std::isnan(odds_[n]) ? 0.0 : odds_[n];
+  }
+
+ private:
+  View<const double, 1> odds_;
+  std::int32_t reach_ = 0;
+  Array<std::int32_t, 2> lookup_;
+};
+
+// The number of places inside the layout after a shift; -1 where more than `most` lie outside.
+std::int64_t count_inside(const std::vector<AxialStep>& places, std::int32_t dq, std::int32_t dr,
+                          std::int64_t most, View<const std::int32_t, 2> cell_lookup) {
+  std::int64_t outside = 0;
+  for (const AxialStep& a : places)
+    if (layout::cell_at(cell_lookup, a.q + dq, a.r + dr) < 0 && ++outside > most) return -1;
+  return static_cast<std::int64_t>(places.size()) - outside;
+}
+
+}  // namespace
+
+Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> naming,
+                      View<const std::int32_t, 2> white_axial, View<const double, 1> white,
+                      const RegisteredLayout& layout, const WitnessLimits& limits) {
+  const WhitePlaces whites(white_axial, white);
+  const auto most =
+      std::max(limits.min_outside,
+               static_cast<std::int64_t>(limits.max_outside_share * static_cast<double>(axial.size())));
+  std::vector<AxialStep> cells, of_layout;
+  for (Index i = 0; i < axial.size(); ++i) cells.push_back({axial(i, 0), axial(i, 1)});
+  for (Index u = 0; u < layout.axial.size(); ++u)
+    of_layout.push_back({layout.axial(u, 0), layout.axial(u, 1)});
+  std::array<Extent, 3> allowed;
+  for (int axis = 0; axis < 3; ++axis) allowed[axis] = trimmed_extent(of_layout, axis, 0.0);
+  std::vector<ScoredMotion> found;
+  for (std::int32_t turn = 0; turn < TURNS; ++turn) {
+    std::vector<AxialStep> turned;
+    for (const AxialStep& a : cells) turned.push_back(turned_up(a, turn));
+    std::array<Extent, 3> own;
+    for (int axis = 0; axis < 3; ++axis) own[axis] = trimmed_extent(turned, axis, limits.trimmed_share);
+    for (std::int32_t dq = allowed[0].low - own[0].low; dq <= allowed[0].high - own[0].high; ++dq)
+      for (std::int32_t dr = allowed[1].low - own[1].low; dr <= allowed[1].high - own[1].high; ++dr) {
+        if (own[2].low + dq + dr < allowed[2].low || own[2].high + dq + dr > allowed[2].high) continue;
+        const std::int64_t inside = count_inside(turned, dq, dr, most, layout.cell_lookup);
+        if (inside < 0) continue;
+        const Motion motion{turn, dq, dr};
+        double odds = 0.0;
+        for (Index w = 0; w < layout.white_axial.size(); ++w)
+          odds += whites.at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
+        const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
+        const double outside = static_cast<double>(axial.size() - inside);
+        found.push_back(
+            {motion, naming[((shift % 3) + 3) % 3] + odds - limits.outside_weight * outside, inside, odds});
+      }
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const ScoredMotion& a, const ScoredMotion& b) { return a.score > b.score; });
+  const Index count = std::min<Index>(static_cast<Index>(found.size()), limits.max_motions);
+  Array<std::int32_t, 2> motions({count, 3});
+  Array<double, 1> scores({count}), odds({count});
+  Array<std::int64_t, 1> inside({count});
+  for (Index k = 0; k < count; ++k) {
+    motions(k, 0) = found[k].motion.turn, motions(k, 1) = found[k].motion.dq,
+               motions(k, 2) = found[k].motion.dr;
+    scores[k] = found[k].score, odds[k] = found[k].white, inside[k] = found[k].inside;
+  }
+  return {std::move(motions), std::move(scores), std::move(inside), std::move(odds)};
+}
+
+Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,
+                                   std::int32_t dr, View<const std::int32_t, 2> cell_lookup) {
+  Array<std::int32_t, 1> out({axial.size()});
+  for (Index i = 0; i < axial.size(); ++i) {
+    const AxialStep a = moved_up({axial(i, 0), axial(i, 1)}, {turn, dq, dr});
+    out[i] = layout::cell_at(cell_lookup, a.q, a.r);
+  }
+  return out;
+}
+
+}  // namespace cmp::numbering

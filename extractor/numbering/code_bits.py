@@ -1,0 +1,90 @@
+"""Stage 7: the bits of a coded pad, one witness of a part's motion.
+
+A black place of the pattern is a bit: white or black. Each bit that differs from the layout's has the same log odds
+against a motion. By bits alone a motion is accepted if few are wrong, and if the second best motion has so many
+more that misread bits would not explain its defeat.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor.numbering.ink_fields import InkFields
+
+STEPS_BESIDE = np.array([[0, 0], [-1, 0], [-1, 1]])  # from a down-cell to the up-cells that share its sides
+MAX_AXIAL = 1 << 16  # more than any axial coordinate of an image
+
+
+class CodeLimits(NamedTuple):
+    """Limits of the witness.
+
+    Attributes:
+        wrong_bit: log odds against a motion for each wrong bit. Chosen.
+        dark: whiteness up to which a place is black; blurred and milky black stays below. Chosen.
+        cells_beside: of the part, at the sides of a place, with fewer of which the place may be hidden. Chosen.
+        min_bits: known bits, with fewer of which a code is not known. Derived: three quarters of the smallest window.
+        max_misfit: share of the known bits that are wrong. Measured: ``python -m benchmarks.pad_codes``.
+        lead_bits, lead_share: the least number of bits, and the share of the known bits, that the second best motion
+            has wrong in addition. Measured: the same command.
+    """
+
+    wrong_bit: float = 3.0
+    dark: float = 0.3
+    cells_beside: int = 2
+    min_bits: int = 36
+    max_misfit: float = 0.1
+    lead_bits: float = 3.0
+    lead_share: float = 0.1
+
+
+LIMITS = CodeLimits()
+
+
+class CodeBits(NamedTuple):
+    """The bits of one part.
+
+    Attributes:
+        odds: (D,) float64, of the part's down-cells, ``wrong_bit`` for white, the negative for black, NaN for unknown.
+            Their sum at the layout's white cells is the log odds of a motion, but for a constant.
+        known: number of the known bits.
+        white: number of the white ones among them.
+    """
+
+    odds: NDArray[np.float64]
+    known: int
+    white: int
+
+    @staticmethod
+    def of(fields: InkFields, axial: NDArray[np.int32]) -> CodeBits:
+        """The bits of a part with the cells (P, 2). A bright place that is no triangle is unknown: glare or dirt."""
+        beside = np.isin(_key(fields.down_axial[:, None] + STEPS_BESIDE), _key(axial)).sum(axis=1)
+        white = fields.is_triangle
+        black = (fields.whiteness < LIMITS.dark) & (beside >= LIMITS.cells_beside)
+        odds = np.where(white, LIMITS.wrong_bit, np.where(black, -LIMITS.wrong_bit, np.nan))
+        return CodeBits(odds, int((white | black).sum()), int(white.sum()))
+
+    def misfit(self, odds: float) -> float:
+        """The share of the known bits that are wrong by a motion with these log odds; outside the layout is black."""
+        return (self.white - odds / LIMITS.wrong_bit) / max(self.known, 1)
+
+    def is_code(self, odds: float) -> bool:
+        """Whether a motion with these log odds shows the layout's code, and no other one."""
+        return self.is_known and self.misfit(odds) <= LIMITS.max_misfit
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the bits are enough to tell codes apart."""
+        return self.known >= LIMITS.min_bits
+
+    @property
+    def min_lead(self) -> float:
+        """Log odds over the second best motion, from which on bits alone prove a motion."""
+        return LIMITS.wrong_bit * (LIMITS.lead_bits + LIMITS.lead_share * self.known)
+
+
+def _key(axial: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(...,) one number for each place (..., 2)."""
+    return np.asarray(axial[..., 0].astype(np.int64) * MAX_AXIAL + axial[..., 1])

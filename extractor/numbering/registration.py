@@ -1,0 +1,400 @@
+"""Stage 7: registers connected parts of cells with the layout.
+
+What is unknown of a part is a motion: one of three turns, and a shift. All motions are scored by all witnesses: cells
+outside the layout, the naming of the inks, and the white cell's place, or the bits of a code. The part's motion is
+accepted if its lead over the second best is large. All other parts, a single cell being the smallest, are then
+registered against the placed ones by a smooth local map and their inks. A cell without a certain place has no number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from extractor._native import numbering as native
+from extractor.cells.cell_mesh import CellMesh
+from extractor.cells.cells import Cells
+from extractor.image.pyramid import PyramidLevel
+from extractor.layout.lattice_tables import Lattice, cells_at
+from extractor.numbering.code_bits import CodeBits
+from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
+from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
+from extractor.numbering.witnesses import (
+    ATTACHMENT,
+    CODE_WITNESSES,
+    WHITE,
+    WITNESSES,
+    AttachmentLimits,
+    BrightPlaces,
+)
+from extractor.result import Origin, Reason
+
+MIN_LAYOUT_SHARE = 0.06  # of the layout's cells, of a part that gives the origin; chosen
+MIN_CELLS = 9  # least number of these cells, or all cells of a smaller layout; chosen
+MAX_PARTS = 4  # that are tried for the origin, the largest; chosen
+NAMING_WEIGHT = 8.0  # log odds for one unit of the naming; chosen
+MIN_FIT = 0.75  # of the colors of the three classes; tilings of other inks have half. Chosen
+SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, to be refused; chosen
+MAX_TIED = 60  # motions between which the other parts may decide; chosen, for time
+OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
+LEAD = 8.0  # log odds of the best motion over the second best; chosen
+JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
+MIN_NUMBERED_SHARE = 0.5  # of the cells of large parts; with fewer, all motions are compared. Chosen
+ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
+
+
+class RegisteredLayout(NamedTuple):
+    """The layout as native loops take it.
+
+    Attributes:
+        axial: (U, 2) int32, of the colored cells.
+        white_axial: (W, 2) int32, of the white down-cells.
+        cell_lookup: (S, S) int32, as ``Lattice.cell_lookup``.
+    """
+
+    axial: NDArray[np.int32]
+    white_axial: NDArray[np.int32]
+    cell_lookup: NDArray[np.int32]
+
+
+class Motions(NamedTuple):
+    """The best motions of a part, the best first.
+
+    Attributes:
+        motion: (K, 3) int32, turn, and shifts of q and r.
+        score: (K,) float64, log odds.
+        inside: (K,) int64, number of cells in the layout.
+        white: (K,) float64, the log odds of the white places alone.
+    """
+
+    motion: NDArray[np.int32]
+    score: NDArray[np.float64]
+    inside: NDArray[np.int64]
+    white: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Numbering:
+    """Stage 7.
+
+    Attributes:
+        cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        mirrored: the pattern is seen from its back.
+        origin: the evidence for the origin.
+        lead: log odds of the motion of the first part over the second best.
+        fields: the colors around the first part.
+        code_misfit: share of the known bits of a code that are wrong in the first part; 0 without a code.
+    """
+
+    cell: NDArray[np.int32]
+    mirrored: bool
+    origin: Origin
+    lead: float
+    fields: InkFields
+    code_misfit: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Refusal:
+    """Why no cell is numbered.
+
+    Attributes:
+        reason: the reason.
+        fields: the colors around the largest part, if there is one.
+    """
+
+    reason: Reason
+    fields: InkFields | None = None
+
+
+class _WalkedImage(NamedTuple):
+    """The cells of an image, their links, light, and places in the lattice."""
+
+    view: PyramidLevel
+    cells: Cells
+    mesh: CellMesh
+    light: NDArray[np.float64]
+    walk: Walk
+
+    def seen_from(self, mirrored: bool) -> WalkedCells:
+        return seen_from(self.cells, self.mesh, self.walk, mirrored)
+
+
+class SeenPart(NamedTuple):
+    """A part with its colors.
+
+    Attributes:
+        part: its number.
+        cells: the cells of the image.
+        fields: the colors around the part.
+        mirrored: the part is seen from its back.
+        naming: (3,) float64, log odds of the namings.
+    """
+
+    part: int
+    cells: WalkedCells
+    fields: InkFields
+    mirrored: bool
+    naming: NDArray[np.float64]
+
+
+class PlacedPart(NamedTuple):
+    """A part with its motions.
+
+    Attributes:
+        seen: the part.
+        motions: the motions.
+        white_axial: (W, 2) int32, of the white triangles.
+        other_whites: number of these at black cells of a layout without a code, by the best motion.
+        bits: of a coded layout.
+    """
+
+    seen: SeenPart
+    motions: Motions
+    white_axial: NDArray[np.int32]
+    other_whites: int
+    bits: CodeBits | None
+
+    @property
+    def lead(self) -> float:
+        scores = self.motions.score
+        lead = float(scores[0] - scores[1]) if len(scores) > 1 else np.inf
+        return lead - OTHER_WHITE * self.other_whites
+
+    @property
+    def is_own(self) -> NDArray[np.bool_]:
+        """(N,) bool, the part's cells."""
+        return np.asarray(self.seen.cells.part == self.seen.part)
+
+    @property
+    def tied(self) -> NDArray[np.intp]:
+        """(T,) the motions that are not certainly worse than the best."""
+        return np.flatnonzero(self.motions.score > self.motions.score.max(initial=-np.inf) - LEAD)
+
+    @property
+    def is_certain(self) -> bool:
+        if len(self.motions.score) == 0 or self.lead < LEAD or not self.is_code:
+            return False
+        return self.bits is None or self.is_proved_by_bits or self.lead_without_bits >= LEAD
+
+    @property
+    def is_code(self) -> bool:
+        """Whether the best motion shows the code of the layout, if it has one."""
+        return self.bits is None or self.bits.is_code(float(self.motions.white[0]))
+
+    @property
+    def is_proved_by_bits(self) -> bool:
+        return self.bits is not None and self.lead >= self.bits.min_lead
+
+    @property
+    def lead_without_bits(self) -> float:
+        """Log odds of the best motion over the others by all witnesses but the bits."""
+        scores = self.motions.score - self.motions.white
+        return float(scores[0] - scores[1:].max(initial=-np.inf))
+
+
+class Registration:
+    """Registers the cells of images with one layout.
+
+    Args:
+        lattice: the layout.
+        palette: its inks.
+        mirrored: whether images show the back; None where both sides are read.
+    """
+
+    def __init__(self, lattice: Lattice, palette: Palette, mirrored: bool | None) -> None:
+        self._lattice = lattice
+        self._palette = palette
+        self._mirrored = mirrored
+        self._layout = RegisteredLayout(lattice.axial, lattice.white_axial, lattice.cell_lookup)
+        self._is_coded = len(lattice.white_axial) > 1
+        self.min_cells = max(MIN_LAYOUT_SHARE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
+
+    def number(
+        self, view: PyramidLevel, cells: Cells, mesh: CellMesh, light: NDArray[np.float64], walk: Walk
+    ) -> Numbering | Refusal:
+        """The numbers of the cells, or the reason why there are none.
+
+        Args:
+            view: the image at the scale of recognition.
+            cells, mesh, light, walk: the cells of the image, their links, light, and places in the lattice.
+        """
+        sizes = walk.sizes
+        large = [int(p) for p in np.argsort(-sizes, kind="stable")[:MAX_PARTS] if sizes[p] >= self.min_cells]
+        if not large:
+            return Refusal(Reason.NO_PATTERN)
+        image = _WalkedImage(view, cells, mesh, light, walk)
+        seen = [self._see(image, part) for part in large]
+        bright = BrightPlaces.of([one.fields.whiteness for one in seen if isinstance(one, SeenPart)])
+        found = [self.register(one, bright) if isinstance(one, SeenPart) else one for one in seen]
+        placed = [one for one in found if isinstance(one, PlacedPart)]
+        certain = [one for one in placed if one.is_certain]
+        if placed and not certain:
+            fewest = min(placed, key=lambda one: len(one.tied) or MAX_TIED)
+            certain = self._with_all_parts(fewest, len(fewest.tied))
+        for one in certain:
+            numbering = self._number_with(one, placed)
+            if numbering is not None:
+                return numbering
+        return (
+            found[0]
+            if isinstance(found[0], Refusal)
+            else Refusal(_uncertain_reason(found[0]), found[0].seen.fields)
+        )
+
+    def _see(self, image: _WalkedImage, part: int) -> SeenPart | Refusal:
+        """The colors of a part, or the reason why its side is refused."""
+        mirrored = bool(self._mirrored)
+        walked = image.seen_from(mirrored)
+        fields = ink_fields(image.view, walked, image.light, part)
+        if fields.fit < MIN_FIT:
+            return Refusal(Reason.NO_PATTERN, fields)
+        own, other = self._palette.naming(fields.shares), self._palette.naming(fields.shares, other_side=True)
+        lead = float(other.max() - own.max())
+        if self._mirrored is None and lead > 0.0:
+            mirrored = not mirrored
+            walked = image.seen_from(mirrored)
+            fields = ink_fields(image.view, walked, image.light, part)
+            own = self._palette.naming(fields.shares)
+        is_other = abs(lead) < SIDE_LEAD if self._mirrored is None else lead > SIDE_LEAD
+        if is_other:
+            known = self._mirrored is not None
+            reason = self._palette.other_side_reason(fields.shares) if known else Reason.OTHER_SIDE
+            return Refusal(reason, fields)
+        naming = NAMING_WEIGHT * (own - own.max())
+        # where all classes look alike it is the tiling of another pattern, or the light shows no ink
+        return (
+            SeenPart(part, walked, fields, mirrored, naming)
+            if naming.min() < -LEAD
+            else Refusal(Reason.NO_PATTERN, fields)
+        )
+
+    def register(self, seen: SeenPart, bright: BrightPlaces) -> PlacedPart:
+        """A part with its motions."""
+        fields = seen.fields
+        axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
+        bits = CodeBits.of(fields, axial) if self._is_coded else None
+        white, limits = (
+            (bright.white_odds(fields), WITNESSES) if bits is None else (bits.odds, CODE_WITNESSES)
+        )
+        found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, limits)
+        motions = Motions(*found)
+        white_axial = fields.down_axial[fields.is_triangle]
+        return PlacedPart(seen, motions, white_axial, self._other_whites(white_axial, motions), bits)
+
+    def _other_whites(self, white_axial: NDArray[np.int32], motions: Motions) -> int:
+        """The number of white triangles (W, 2) that the best motion carries to black cells of the layout.
+
+        None of a coded layout, where each is a wrong bit.
+        """
+        if len(motions.score) == 0 or self._is_coded:
+            return 0
+        turn, dq, dr = (int(v) for v in motions.motion[0])
+        count = 0
+        for q, r in white_axial.tolist():
+            for _ in range(turn):
+                q, r = -q - r, q - 1
+            q, r = q + dq, r + dr
+            beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
+            count += (q, r) != (0, 0) and bool((beside >= 0).all())
+        return count
+
+    def _with_all_parts(self, placed: PlacedPart, count: int) -> list[PlacedPart]:
+        """The part with a certain motion, if the other parts decide between its best motions; else nothing.
+
+        Under each motion the other parts are registered; a cell without a place counts as one outside the layout.
+
+        Args:
+            placed: the part.
+            count: number of its best motions that are compared.
+        """
+        if not 1 < count <= MAX_TIED:
+            return []
+        parts = ATTACHMENT._replace(with_single_cells=False)
+        counts = np.array([np.count_nonzero(self._placed_cells(placed, k, parts) >= 0) for k in range(count)])
+        score = placed.motions.score[:count] + WITNESSES.outside_weight * counts
+        order = np.argsort(-score, kind="stable")
+        motions = placed.motions
+        chosen = Motions(motions.motion[order], score[order], motions.inside[order], motions.white[order])
+        decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
+        return [decided] if decided.lead >= JOINT_LEAD and decided.is_code else []
+
+    def _placed_cells(
+        self, placed: PlacedPart, number: int, limits: AttachmentLimits = ATTACHMENT
+    ) -> NDArray[np.int32]:
+        """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
+        seen = placed.seen
+        own = seen.cells.part == seen.part
+        axial = np.ascontiguousarray(seen.cells.axial[own])
+        turn, dq, dr = (int(v) for v in placed.motions.motion[number])
+        cell = np.full(len(own), -1, np.int32)
+        cell[own] = native.moved_cells(axial, turn, dq, dr, self._layout.cell_lookup)
+        shift = _class_shift(self._lattice, cell[own], axial)
+        odds = np.ascontiguousarray(seen.fields.odds[:, (np.arange(3) - shift) % 3])
+        cell = native.attach_parts(
+            seen.cells,
+            cell,
+            odds,
+            self._lattice.layout_cells,
+            self._layout.axial,
+            self._layout.cell_lookup,
+            limits,
+        )
+        odd = is_odd(odds, self._lattice.ink[np.maximum(cell, 0)].astype(np.intp) - 1)
+        return np.where(odd, -1, cell).astype(np.int32)
+
+    def _number_with(self, placed: PlacedPart, parts: list[PlacedPart]) -> Numbering | Refusal | None:
+        """The numbers of all cells by the part whose motion is certain; none if the other parts contradict the
+        motion."""
+        cell = self._placed_cells(placed, 0)
+        sizes = np.array([[one.is_own.sum(), (cell[one.is_own] >= 0).sum()] for one in parts])
+        count, numbered = sizes.sum(axis=0)
+        if numbered < MIN_NUMBERED_SHARE * count:
+            first = next(one for one in parts if one.seen.part == placed.seen.part)
+            again = self._with_all_parts(first, len(first.motions.score))
+            if not again or (again[0].motions.motion[0] != placed.motions.motion[0]).any():
+                return None
+        others = [one for one, own in zip(parts, sizes, strict=True) if own[1] == 0]
+        if any(one.is_certain and one.motions.white[0] > 0.0 for one in others):
+            return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
+        white = float(placed.motions.white[0])
+        misfit = 0.0 if placed.bits is None else placed.bits.misfit(white)
+        return Numbering(cell, placed.seen.mirrored, _origin(placed), placed.lead, placed.seen.fields, misfit)
+
+
+def _origin(placed: PlacedPart) -> Origin:
+    if placed.bits is not None:
+        return Origin.CODE if placed.is_proved_by_bits else Origin.OUTLINE
+    return Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
+
+
+def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """(N,) bool, the cells whose color is not that of their own class (N,), modulo 3, but that of another class.
+
+    Args:
+        odds: (N, 3), the log likelihoods of the classes.
+    """
+    return np.asarray(odds[np.arange(len(odds)), own % 3] < ODD_INK)
+
+
+def _uncertain_reason(placed: PlacedPart) -> Reason:
+    """Why a part has no certain motion."""
+    if placed.bits is not None:
+        known = len(placed.motions.score) > 0 and placed.bits.is_known
+        return Reason.OTHER_CODE if known and not placed.is_code else Reason.AMBIGUOUS
+    white = placed.motions.white
+    close = placed.tied
+    whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites
+    if whites > 1:
+        return Reason.SEVERAL_PADS
+    return Reason.AMBIGUOUS if np.count_nonzero(white[close] > 0.0) > 1 else Reason.REFERENCE_LOST
+
+
+def _class_shift(lattice: Lattice, cell: NDArray[np.int32], axial: NDArray[np.int32]) -> int:
+    """By which a motion shifts the classes (q - r) mod 3."""
+    first = int(np.argmax(cell >= 0))
+    q, r = lattice.axial[cell[first]]
+    return int((q - r - axial[first, 0] + axial[first, 1]) % 3)
