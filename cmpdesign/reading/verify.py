@@ -113,12 +113,15 @@ def judge_markers(
     lost, measured, repaired, fitted = (int(np.count_nonzero(status == code)) for code in range(4))
     present = len(status)
     contradictions = find_color_contradictions(reference, image, markers.xy_px)
-    reason = (
-        _not_found_reason(markers)
-        or _wrong_colors_reason(reference, contradictions)
-        or _wrong_side_reason(reference, markers)
-        or _too_few_reason(markers, measured, present, min_share)
-    )
+    reason = _not_found_reason(markers)
+    if reason is None:
+        colors = _wrong_colors_reason(reference, contradictions)
+        side = _wrong_side_reason(reference, markers)
+        too_few = _too_few_reason(markers, measured, present, min_share)
+        # what hides markers may hide a part of a cell beside them, too
+        is_hidden = too_few is not None and len(contradictions) < present - measured
+        ordered = (side, too_few, colors) if is_hidden else (colors, side, too_few)
+        reason = next((one for one in ordered if one is not None), None)
     return Verdict(
         verified=reason is None,
         reason=reason,

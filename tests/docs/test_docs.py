@@ -342,4 +342,4 @@ def test_every_picture_is_shown() -> None:
         for page in PAGES
         for target in re.findall(r"!\[[^]]+\]\(([^)]+)\)", page.read_text())
     }
-    assert shown == {path.name for path in IMAGES.iterdir()}
+    assert shown == {path.name for folder in (IMAGES, IMAGES.parent / "screens") for path in folder.iterdir()}

@@ -45,6 +45,7 @@ MAY_WRITE = {
     "cmpdesign/reading/problem_report.py": "an archive in memory",
     "cmpdesign/data/files/webdataset.py": "is given a staged path",
     "cmpdesign/cli/terminal.py": "to nowhere",
+    "cmpdesign/studio/builds.py": "an archive in memory, and the output of a process in a private folder",
 }
 WRITING_CALLS = {
     "write_text",

@@ -91,6 +91,8 @@ def _write_weighed(folder: Path) -> None:
     variance_n2 = np.full((FRAMES, 6), 1e-4)
     reason = np.zeros(FRAMES, np.uint8)
     contact = {"force_n": force_n, "force_cov_n2": variance_n2, "contact_reason": reason, "young_mpa": 0.3}
+    contact |= {"torque_nmm": 0 * force_n, "torque_cov_nmm2": variance_n2, "utilisation": np.zeros(FRAMES)}
+    contact |= {"marker_traction_mpa": np.zeros((FRAMES, columns["xy_px"].shape[1], 3), np.float32)}
     np.savez(folder / "run.npz", **columns, **contact)
     rows = "".join(f"{frame},{mass:g}\n" for frame, mass in enumerate(MASSES_G))
     (folder / "weights.csv").write_text("frame,mass_g\n" + rows, encoding="utf-8")
