@@ -173,7 +173,7 @@ def decoded_frames(container: Any, packets: Iterable[Any]) -> Iterator[VideoFram
     for number, packet in enumerate(chain(packets, [None])):  # None: the last frames that the decoder holds
         if packet is not None:
             clock.advance(packet)
-            packet.opaque = number
+            packet.opaque = (number,)  # an object of its own: PyAV finds it again by its address
             is_timed = has_times and packet.pts is not None
             if is_timed and not packet.is_discard:
                 bisect.insort(waiting, (packet.pts, number))
@@ -186,7 +186,7 @@ def decoded_frames(container: Any, packets: Iterable[Any]) -> Iterator[VideoFram
             stamp = frame.pts if has_times else None
             while stamp is not None and waiting and waiting[0][0] < stamp:
                 yield _lost(clock, waiting.pop(0), problems)
-            waiting = [each for each in waiting if each[1] != frame.opaque]
+            waiting = [each for each in waiting if (each[1],) != frame.opaque]
             yield VideoFrame(stamp, clock.seconds(stamp), frame.to_ndarray(format="bgr24"))
     for each in waiting:
         yield _lost(clock, each, problems)

@@ -349,6 +349,17 @@ def test_views_are_joined_by_time(
     assert "joined by time" in source.times.text and "2 frames have no partner" in source.times.text
 
 
+def test_videos_that_are_open_at_the_same_time(images: list[Any], tmp_path: Path) -> None:
+    """Each keeps the frames that its decoder holds back, and gets none of those of another one."""
+    path = str(write_video(tmp_path / "a.mp4", images))
+    ahead, *others = (open_source(path).frames() for _ in range(3))
+    for _ in range(3):
+        next(ahead)
+    for one, other in zip(*others, strict=True):
+        assert one.image is not None and other.image is not None and one.time_s == other.time_s
+    assert [frame.image is None for frame in ahead] == [False] * (COUNT - 3)
+
+
 def test_videos_of_which_one_lacks_a_frame(images: list[Any], tmp_path: Path) -> None:
     stamps = [40 * k for k in range(8)]
     left = write_video(tmp_path / "l.mkv", images[:8], stamps_ms=stamps)

@@ -110,6 +110,21 @@ def test_without_resolution_the_ratio_is_known(scan: Pixels) -> None:
     assert found.scale_x is None and found.ratio == pytest.approx(1.02, abs=1e-3)
 
 
+class RaisingDetector:
+    """As OpenCV's detector on some ordinary pictures."""
+
+    def detectAndDecode(self, _: Pixels) -> None:
+        raise cv2.error("(-215:Assertion failed) in function 'getPerspectiveTransform'")
+
+
+def test_a_detector_that_raises_finds_nothing(scan: Pixels, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other one is asked, and without it the picture has no code: no picture ends in an error of OpenCV."""
+    monkeypatch.setattr(cv2, "QRCodeDetectorAruco", RaisingDetector)
+    assert reading(scan).key.layers == 6
+    monkeypatch.setattr(cv2, "QRCodeDetector", RaisingDetector)
+    assert "no print sheet's code" in str(find_sheet_bars(scan))
+
+
 def test_what_cannot_be_read_says_why(scan: Pixels) -> None:
     blank = np.full_like(scan, 255)
     assert "no print sheet's code" in str(find_sheet_bars(blank))
