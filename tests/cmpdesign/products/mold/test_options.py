@@ -67,7 +67,7 @@ def test_options_that_are_not_used_are_named() -> None:
     assert any("whose edge follows its crown (sphere)" in text for text in clipped)
 
 
-@pytest.mark.parametrize("field", SHEET)
+@pytest.mark.parametrize("field", sorted(SHEET.keys() - {"dot_gain_mm"}))  # which prints as made have alone
 def test_every_option_of_a_sheet_has_an_effect(field: str) -> None:
     def sheet(**values: str) -> str | bytes:
         design = load("honeycomb", {"layers": "3", **values})
