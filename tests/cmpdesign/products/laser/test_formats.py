@@ -231,6 +231,8 @@ def test_the_same_bytes_from_another_process(tmp_path: Path) -> None:
     command = [sys.executable, "-c", code, *arguments, str(tmp_path / "b")]
     assert subprocess.run(command, capture_output=True, timeout=120, check=False).returncode == 0
     files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*"))
-    assert len([file for file in files if not file.name.startswith(".")]) == 4 * 8 + 6 + 8  # with the process sheet, its pictures and its list of materials
+    assert (
+        len([file for file in files if not file.name.startswith(".")]) == 4 * 8 + 6 + 8
+    )  # with the process sheet, its pictures and its list of materials
     for file in files:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file

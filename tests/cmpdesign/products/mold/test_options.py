@@ -27,7 +27,14 @@ OTHER = {
     "fillet_mm": "1", "clearance_mm": "0.12", "pin_diameter_mm": "2.2", "vents": "5", "vent_mm": "0.7",
     "parting_mm": "0.9", "moat_mm": "0.9", "moat_depth_mm": "1.2",
 }  # fmt: skip
-SHEET = {"page": "letter", "pads": "2", "bleed_mm": "1", "film": "clear", "ruler": "true", "dot_gain_mm": "0.03"}
+SHEET = {
+    "page": "letter",
+    "pads": "2",
+    "bleed_mm": "1",
+    "film": "clear",
+    "ruler": "true",
+    "dot_gain_mm": "0.03",
+}
 
 
 def made_of(**values: str) -> tuple[object, list[str]]:
