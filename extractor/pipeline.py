@@ -41,6 +41,7 @@ from extractor.numbering.lattice_walk import Walk, cell_light, count_holes, walk
 from extractor.numbering.marker_places import InitialMarkers, merge_corners
 from extractor.numbering.missing_cells import with_missing_cells
 from extractor.numbering.registration import Numbering, Refusal, Registration
+from extractor.numeric.median import select
 from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
@@ -73,11 +74,15 @@ class FoundCells(NamedTuple):
         """The number of linked cells."""
         return int(np.count_nonzero(self.walk.part >= 0))
 
+    @property
+    def side_px(self) -> float:
+        """The side of an equilateral triangle of the linked cells' median area; 0 without any."""
+        areas = self.cells.area_px[self.walk.part >= 0]
+        return math.sqrt(select(areas, len(areas) // 2) / EQUILATERAL_AREA) if len(areas) else 0.0
+
     def is_small(self, view: PyramidLevel) -> bool:
         """Whether the linked cells are too small for this reduced scale; also without any."""
-        areas = self.cells.area_px[self.walk.part >= 0]
-        least = EQUILATERAL_AREA * (MIN_LEVEL_EDGE_PX * view.scale) ** 2
-        return view.scale > 1 and (len(areas) == 0 or float(np.median(areas)) < least)
+        return view.scale > 1 and self.side_px < MIN_LEVEL_EDGE_PX * view.scale
 
 
 class NumberedCells(NamedTuple):
@@ -108,8 +113,7 @@ class Unnumbered(NamedTuple):
         """The median side of the linked cells; NaN without a pattern."""
         if self.found is None or self.refusal.reason == Reason.NO_PATTERN:
             return math.nan
-        areas = self.found.cells.area_px[self.found.walk.part >= 0]
-        return math.sqrt(float(np.median(areas)) * 4.0 / math.sqrt(3.0)) / self.found.mesh.swelling
+        return self.found.side_px / self.found.mesh.swelling
 
 
 class NumberedMarkers(NamedTuple):

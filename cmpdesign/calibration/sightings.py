@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -78,8 +77,3 @@ class Sheet:
         """(S,) standard deviations of the displacements of usual sheets: a twentieth of the size, 1 % in the plane."""
         moves_out = np.abs(self.bending[:, 2]).max(axis=0) > 0
         return self.size_mm * np.where(moves_out, 0.05, 0.01)
-
-
-def total_points(sightings: Sequence[Sighting]) -> int:
-    """The number of points in all pictures."""
-    return sum(len(one.ids) for one in sightings)

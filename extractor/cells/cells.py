@@ -8,7 +8,6 @@ no color of the light is assumed.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -107,11 +106,6 @@ class Cells:
     quality: NDArray[np.float64]
     share: NDArray[np.float64]
 
-    @property
-    def edge_px(self) -> float:
-        """The edge of an equilateral triangle of the median area; 0 without cells."""
-        return math.sqrt(float(np.median(self.area_px)) * 4.0 / math.sqrt(3.0)) if len(self.area_px) else 0.0
-
 
 def has_color(image: NDArray[np.uint8]) -> bool:
     """Whether some pixels of an image (H, W, 3) have a color: others than gray, black and white."""
@@ -144,7 +138,6 @@ def find_cells(
         )
     center, area, corner, quality, share = native.find_candidates(
         np.ascontiguousarray(view.image),
-        0,
         effort.maps,
         effort.shares,
         *known,

@@ -66,13 +66,11 @@ class Motions(NamedTuple):
     Attributes:
         motion: (K, 3) int32, turn, and shifts of q and r.
         score: (K,) float64, log odds.
-        inside: (K,) int64, number of cells in the layout.
         white: (K,) float64, the log odds of the white places alone.
     """
 
     motion: NDArray[np.int32]
     score: NDArray[np.float64]
-    inside: NDArray[np.int64]
     white: NDArray[np.float64]
 
 
@@ -318,7 +316,7 @@ class Registration:
         score = placed.motions.score[:count] + WITNESSES.outside_weight * counts
         order = np.argsort(-score, kind="stable")
         motions = placed.motions
-        chosen = Motions(motions.motion[order], score[order], motions.inside[order], motions.white[order])
+        chosen = Motions(motions.motion[order], score[order], motions.white[order])
         decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
         return [decided] if decided.lead >= JOINT_LEAD and decided.is_code else []
 

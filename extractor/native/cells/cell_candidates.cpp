@@ -14,7 +14,7 @@ constexpr double EQUILATERAL = 0.4330127018922193;  // area over the square of t
 
 // A triangle with the size of its side.
 struct Candidate {
-  double x, y, area, quality, height;
+  double x, y, area, quality, share;
   std::array<double, 6> corner;
 };
 
@@ -66,13 +66,13 @@ double own_share(const image::ContrastMap& map, const MomentShape& shape, double
 }
 
 // The triangles of some maps at some levels.
-std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index first, Index count,
+std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index count,
                                      View<const double, 1> shares, const CandidateLimits& limits) {
   std::vector<Candidate> all;
   const auto channels = image::smoothed_channels(image);
   const double least = limits.min_contrast_deviations * std::max(image::smoothed_noise(channels), 0.3);
   const double most = limits.max_area_share * static_cast<double>(image.size(0) * image.size(1));
-  for (Index k = first; k < first + count; ++k) {
+  for (Index k = 0; k < count; ++k) {
     const auto map = image::contrast_map(channels, k, limits.tile_px);
     for (const double share : shares)
       for (const MomentSums& sums : level_regions(map, share, least, limits.min_area_px, most)) {
@@ -91,14 +91,13 @@ std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index fi
 
 }  // namespace
 
-FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index first, Index count,
-                                View<const double, 1> shares, View<const double, 2> center,
-                                View<const double, 1> area, View<const double, 3> corner,
-                                View<const double, 1> quality, View<const double, 1> height,
-                                const CandidateLimits& limits) {
-  std::vector<Candidate> all = candidates_of(image, first, count, shares, limits);
+FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index count, View<const double, 1> shares,
+                                View<const double, 2> center, View<const double, 1> area,
+                                View<const double, 3> corner, View<const double, 1> quality,
+                                View<const double, 1> share, const CandidateLimits& limits) {
+  std::vector<Candidate> all = candidates_of(image, count, shares, limits);
   for (Index i = 0; i < center.size(); ++i) {
-    Candidate one{center(i, 0), center(i, 1), area[i], quality[i], height[i], {}};
+    Candidate one{center(i, 0), center(i, 1), area[i], quality[i], share[i], {}};
     for (Index k = 0; k < 6; ++k) one.corner[k] = corner(i, k / 2, k % 2);
     all.push_back(one);
   }
@@ -118,10 +117,10 @@ FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index first, 
   FoundCandidates out{Array<double, 2>({number, 2}), Array<double, 1>({number}),
                       Array<double, 3>({number, 3, 2}), Array<double, 1>({number}),
                       Array<double, 1>({number})};
-  auto& [centers, areas, corners, qualities, heights] = out;
+  auto& [centers, areas, corners, qualities, levels] = out;
   for (Index i = 0; i < number; ++i) {
     centers(i, 0) = kept[i]->x, centers(i, 1) = kept[i]->y;
-    areas[i] = kept[i]->area, qualities[i] = kept[i]->quality, heights[i] = kept[i]->height;
+    areas[i] = kept[i]->area, qualities[i] = kept[i]->quality, levels[i] = kept[i]->share;
     for (Index k = 0; k < 6; ++k) corners(i, k / 2, k % 2) = kept[i]->corner[k];
   }
   return out;

@@ -27,7 +27,6 @@ Extent trimmed_extent(const std::vector<AxialStep>& places, int axis, double sha
 struct ScoredMotion {
   Motion motion;
   double score;
-  std::int64_t inside;
   double white;
 };
 
@@ -97,7 +96,7 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
         const double outside = static_cast<double>(axial.size() - inside);
         found.push_back(
-            {motion, naming[((shift % 3) + 3) % 3] + odds - limits.outside_weight * outside, inside, odds});
+            {motion, naming[((shift % 3) + 3) % 3] + odds - limits.outside_weight * outside, odds});
       }
   }
   std::stable_sort(found.begin(), found.end(),
@@ -105,13 +104,12 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
   const Index count = std::min<Index>(static_cast<Index>(found.size()), limits.max_motions);
   Array<std::int32_t, 2> motions({count, 3});
   Array<double, 1> scores({count}), odds({count});
-  Array<std::int64_t, 1> inside({count});
   for (Index k = 0; k < count; ++k) {
     motions(k, 0) = found[k].motion.turn, motions(k, 1) = found[k].motion.dq,
                motions(k, 2) = found[k].motion.dr;
-    scores[k] = found[k].score, odds[k] = found[k].white, inside[k] = found[k].inside;
+    scores[k] = found[k].score, odds[k] = found[k].white;
   }
-  return {std::move(motions), std::move(scores), std::move(inside), std::move(odds)};
+  return {std::move(motions), std::move(scores), std::move(odds)};
 }
 
 Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,

@@ -34,10 +34,9 @@ struct RegisteredLayout {
   }
 };
 
-// The K best motions, the best first: (K, 3) turn, dq and dr; scores (K,), log odds; inside (K,), how many
-// cells lie in the layout; white (K,), the log odds of the white places alone.
-using Motions =
-    std::tuple<Array<std::int32_t, 2>, Array<double, 1>, Array<std::int64_t, 1>, Array<double, 1>>;
+// The K best motions, the best first: (K, 3) turn, dq and dr; scores (K,), log odds; white (K,), the log
+// odds of the white places alone.
+using Motions = std::tuple<Array<std::int32_t, 2>, Array<double, 1>, Array<double, 1>>;
 
 // Motions of a part's N cells: `turn` rotations by 120 degrees about marker 0, then a shift.
 //
