@@ -1,7 +1,5 @@
 """Two methods of numbering the cells of the same images: the article's, and the extractor's.
 
-    python -m benchmarks.numbering
-
 The article finds cells by hue and AGA, and numbers a graph of corners. The extractor finds cells by contrast, and
 registers the parts of a mesh of cells. A cell is right if it gets the layout's number, and wrong if it gets another.
 """
@@ -12,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
 
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.article.corners import fit_plain_triangles
 from benchmarks.suites.article.graph import connect_corners
 from benchmarks.suites.article.numbering import make_lattice_tables as article_lattice
@@ -136,18 +134,20 @@ def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount
     return article, registered
 
 
-def main() -> None:
-    table = Table(title=f"cells numbered, {len(PATTERNS)} patterns x {len(SEEDS)} images, {LAYERS} layers")
-    for name in ("condition", "visible", "article: right", "wrong", "registered: right", "wrong"):
-        table.add_column(name, justify="left" if name == "condition" else "right")
+def measure() -> Shown:
+    """One row for every condition."""
+    rows = []
     for condition in CONDITIONS:
         article, registered = compare_methods(condition)
-        row = [f"{article.visible}"]
-        for count in (article, registered):
-            row += [f"{100 * count.right / count.visible:.2f} %", f"{count.wrong}"]
-        table.add_row(condition.name, *row)
-    Console(width=110).print(table)
+        counts = [(100 * one.right / one.visible, one.wrong) for one in (article, registered)]
+        rows.append((condition.name, article.visible, *counts[0], *counts[1]))
+    columns = {"condition": TEXT, "visible": "d", "article: right %": ".2f", "article: wrong": "d"}
+    columns |= {"registered: right %": ".2f", "registered: wrong": "d"}
+    title = f"cells numbered, {len(PATTERNS)} patterns x {len(SEEDS)} images, {LAYERS} layers"
+    yield Table(title, columns, rows)
 
+
+main = Experiment("numbering", measure)
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())
