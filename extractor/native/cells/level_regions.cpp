@@ -35,6 +35,13 @@ void add_run(MomentSums& sums, const Run& run) {
   m[6] += x3, m[7] += x2 * y, m[8] += x1 * y * y, m[9] += n * y * y * y;
 }
 
+// Writes levels that rise by a step from each to the next.
+CMP_PART_OF_LOOP void fill_ramp(float from, float step, View<std::int16_t, 1> out) {
+  const auto count = static_cast<std::int32_t>(out.size());
+  for (std::int32_t i = 0; i < count; ++i)
+    out[i] = static_cast<std::int16_t>(static_cast<std::int32_t>(from + step * static_cast<float>(i)));
+}
+
 // Writes the level of each pixel of a row, in 1 / FIXED_ONE, between the middles of tiles.
 void fill_row_levels(View<const float, 2> tiles, Index tile_px, Index y, View<std::int16_t, 1> out,
                      View<float, 1> line) {
@@ -52,8 +59,7 @@ void fill_row_levels(View<const float, 2> tiles, Index tile_px, Index y, View<st
     const float from = line[tile], to = line[std::min(tile + 1, columns - 1)];
     const float step = (to - from) / static_cast<float>(tile_px);
     const Index begin = half + tile * tile_px, end = std::min(begin + tile_px, out.size());
-    for (Index x = begin; x < end; ++x)
-      out[x] = static_cast<std::int16_t>(from + step * static_cast<float>(x - begin));
+    if (begin < end) fill_ramp(from, step, out.slice(begin, end));
   }
 }
 
