@@ -18,7 +18,6 @@ from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 
 
-
 class LinkInkLimits(NamedTuple):
     """Limits of inks at links (eq. 4: at most one cell of each ink at a marker).
 

@@ -21,12 +21,17 @@ using layout::UNKNOWN_AXIAL;
 
 constexpr int CORNER_AXIAL[3][2] = {{0, 0}, {1, 0}, {0, 1}};  // of an up-cell, as in the conventions
 
-// The axial step of link j of a cell whose corner `first` is corner 0.
-AxialStep axial_step(Index j, int first) {
-  const auto [a, b] = STEP_CORNERS[j];
-  const int *from = CORNER_AXIAL[(a + 3 - first) % 3], *to = CORNER_AXIAL[(b + 3 - first) % 3];
-  return {from[0] - to[0], from[1] - to[1]};
-}
+// The axial step of link j of a cell whose corner `first` is corner 0: at [j][first].
+constexpr auto AXIAL_STEPS = [] {
+  std::array<std::array<AxialStep, 3>, STEPS> out{};
+  for (Index j = 0; j < STEPS; ++j)
+    for (int first = 0; first < 3; ++first) {
+      const int *from = CORNER_AXIAL[(STEP_CORNERS[j][0] + 3 - first) % 3],
+                *to = CORNER_AXIAL[(STEP_CORNERS[j][1] + 3 - first) % 3];
+      out[j][first] = {from[0] - to[0], from[1] - to[1]};
+    }
+  return out;
+}();
 
 // A cell that can be reached; the best link is followed first.
 struct Reached {
@@ -109,7 +114,7 @@ class Walk {
       for (Index j = 0; j < STEPS; ++j) {
         const std::int32_t to = links_.neighbours(i, j);
         if (to < i || part_[to] != part_[i]) continue;
-        const AxialStep step = axial_step(j, first_[i]);
+        const AxialStep step = AXIAL_STEPS[j][first_[i]];
         if (axial_(to, 0) == axial_(i, 0) + step.q && axial_(to, 1) == axial_(i, 1) + step.r) continue;
         bad[i] = bad[to] = true;
         ++count;
@@ -138,7 +143,7 @@ class Walk {
       for (Index j = 0; j < STEPS; ++j) {
         const std::int32_t to = links_.neighbours(here.cell, j);
         if (to < 0 || part_[to] >= 0 || blocked_[to]) continue;
-        const AxialStep step = axial_step(j, here.first);
+        const AxialStep step = AXIAL_STEPS[j][here.first];
         const int first = first_corner(links_.back(here.cell, j), {-step.q, -step.r});
         if (first < 0) continue;
         waiting.push({std::max(here.misfit, links_.misfit(here.cell, j)),
@@ -159,7 +164,7 @@ class Walk {
   // The corner that is corner 0 of a cell whose link j is this axial step; -1 if there is none.
   static int first_corner(Index j, AxialStep step) {
     for (int first = 0; first < 3; ++first)
-      if (axial_step(j, first) == step) return first;
+      if (AXIAL_STEPS[j][first] == step) return first;
     return -1;
   }
 
