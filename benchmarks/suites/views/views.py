@@ -62,29 +62,62 @@ class ViewResult:
     reason: str
 
 
-def read_view(view: View) -> ViewResult:
-    """Shoot, cover, and read a view; one thread."""
-    cv2.setNumThreads(1)
+@dataclass(frozen=True, eq=False)
+class ShotView:
+    """The picture of a view.
+
+    Attributes:
+        pose: of the pattern.
+        picture: with its covers; ``visible`` are the markers away from them.
+        cells: seen colored cells.
+        motions: motions that put them into the pattern, the true one included; 0 without cells.
+    """
+
+    pose: Pose
+    picture: CameraPicture
+    cells: int
+    motions: int
+
+
+def shoot_view(view: View) -> ShotView:
+    """Shoot and cover a view."""
     rng = np.random.default_rng([view.seed, view.number, KINDS.index(view.kind)])
     pose = _sample_pose(rng)
     lens = Lens(blur_px=float(rng.uniform(0.6, 1.1)))
     picture = shoot(Chain(pose=pose, lens=lens, sensor=Sensor(), seed=int(rng.integers(2**31))))
     covers = _covers(picture, pose, view.kind, rng)
-    picture = replace(picture, image=_covered(picture.image, covers, rng))
-    seen = seen_cells(picture, covers)
-    markers = cached_extractor(pose.pattern, pose.layers, "balanced").extract(picture.image)
+    picture = replace(
+        picture,
+        image=_covered(picture.image, covers, rng),
+        visible=picture.visible & ~_are_covered(picture.marker_xy_px, covers),
+    )
+    seen = up_cells(picture.layout, seen_cells(picture, covers))
+    pattern = up_cells(picture.layout, colored_cells(picture.layout))
+    return ShotView(pose, picture, len(seen), fitting_motions(pattern, seen) if len(seen) else 0)
+
+
+def read_view(view: View) -> ViewResult:
+    """Shoot, cover, and read a view; one thread."""
+    cv2.setNumThreads(1)
+    shot = shoot_view(view)
+    markers = cached_extractor(shot.pose.pattern, shot.pose.layers, "balanced").extract(shot.picture.image)
     return ViewResult(
         view=view,
-        cells=len(seen),
-        motions=fitting_motions(
-            up_cells(picture.layout, colored_cells(picture.layout)), up_cells(picture.layout, seen)
-        )
-        if len(seen)
-        else 0,
+        cells=shot.cells,
+        motions=shot.motions,
         reported=int(markers.status.astype(bool).sum()),
-        wrong_ids=int((marker_outcomes(picture, markers) == WRONG_ID).sum()),
+        wrong_ids=int((marker_outcomes(shot.picture, markers) == WRONG_ID).sum()),
         reason=str(markers.reason or ""),
     )
+
+
+def _are_covered(xy_px: NDArray[np.float64], covers: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """(M,) whether places lie on a cover; places outside the picture do not."""
+    place = np.rint(np.nan_to_num(xy_px, nan=-1.0)).astype(int)
+    inside = ((place >= 0) & (place < covers.shape[::-1])).all(axis=1)
+    covered = np.zeros(len(place), np.bool_)
+    covered[inside] = covers[place[inside, 1], place[inside, 0]] > 0
+    return covered
 
 
 def colored_cells(layout: Layout) -> NDArray[np.int64]:
