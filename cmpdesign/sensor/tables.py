@@ -154,13 +154,15 @@ class Calibrations(_StrictTable):
 class CameraTable(_StrictTable):
     """The camera, and what its driver is asked for; None: as the driver has it. Its size is the file's ``size_px``."""
 
-    source: Line = Field("", description="As on the command line; of several cameras joined by commas.")
+    source: Line = Field(
+        default="", description="As on the command line; of several cameras joined by commas."
+    )
     fps: Positive | None = None
-    format: Line | None = Field(None, description="Four letters of the pixel format, as MJPG.")
+    format: Line | None = Field(default=None, description="Four letters of the pixel format, as MJPG.")
     exposure_ms: Positive | None = None
-    gain: float | None = Field(None, ge=0)
+    gain: float | None = Field(default=None, ge=0)
     white_balance_k: Positive | None = None
-    focus: float | None = Field(None, ge=0)
+    focus: float | None = Field(default=None, ge=0)
 
     @field_validator("format")
     @classmethod
@@ -181,9 +183,11 @@ class LimitsTable(_StrictTable):
         min_share_read: Chosen: 0.9, since a rest frame shows nearly all markers.
     """
 
-    max_age_ms: Positive = Field(100.0, description="Of a result, from the middle of its exposure.")
-    max_rest_error_px: Positive | None = Field(None, description="RMS at rest, per axis.")
-    min_share_read: float = Field(0.9, ge=0, le=1, description="Markers measured, of those in view at rest.")
+    max_age_ms: Positive = Field(default=100.0, description="Of a result, from the middle of its exposure.")
+    max_rest_error_px: Positive | None = Field(default=None, description="RMS at rest, per axis.")
+    min_share_read: float = Field(
+        default=0.9, ge=0, le=1, description="Markers measured, of those in view at rest."
+    )
 
 
 class SensorTable(_StrictTable):
