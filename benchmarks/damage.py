@@ -214,7 +214,7 @@ def measure(
     found: dict[str, Calibration] = {
         f"{row.kind}: {position}": stated for row in rows for position, stated in row.calibrations.items()
     }
-    yield calibration_table("", found)
+    yield calibration_table("errors over covariances", found)
     yield f"{images} images, seeds {seed} to {seed + images - 1}"
     return Found(failed=any(row.wrong or row.raised for row in rows))
 

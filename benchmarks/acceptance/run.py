@@ -23,9 +23,9 @@ from typing import NamedTuple
 from benchmarks.acceptance.points import Point, pooled_point
 from benchmarks.acceptance.report import NAME, curve_table, documentation_blocks
 from benchmarks.frame.conditions import commit_seed, conditions_text
-from benchmarks.suites.ablation.code_copy import ROOT, CodeCopy, Replacement
 from benchmarks.suites.ablation.pictures import KeptPicture, keep_cases, keep_pictures, random_damage_cases
 from benchmarks.suites.ablation.trial import read_changed, score_reading
+from benchmarks.suites.code_copy import ROOT, CodeCopy, Replacement
 from benchmarks.suites.stress.frames import PATTERNS
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
 from benchmarks.support.command import publishing_parser, wide_console, write_json, write_published

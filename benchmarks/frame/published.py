@@ -65,9 +65,9 @@ def updated_pages(blocks: Mapping[str, str]) -> dict[Path, str]:
     return found
 
 
-def json_text(results: Mapping[str, Any]) -> str:
+def json_text(results: Mapping[str, Any], *, is_sorted: bool = False) -> str:
     """JSON of results, with null for every float that JSON has no text for: NaN and infinities."""
-    return json.dumps(_plain(results), indent=1, sort_keys=True) + "\n"
+    return json.dumps(_plain(results), indent=1, sort_keys=is_sorted) + "\n"
 
 
 def _plain(value: Any) -> Any:
@@ -92,7 +92,7 @@ def read_measured(name: str) -> dict[str, Any]:
 
 def publish(name: str, results: Mapping[str, Any], page: Page) -> list[Path]:
     """Write docs/measured/NAME.json, the pictures, and the blocks of all pages. Returns the written files."""
-    new: dict[Path, str | bytes] = {measured_path(name): json_text(results)}
+    new: dict[Path, str | bytes] = {measured_path(name): json_text(results, is_sorted=True)}
     new |= {IMAGES / image: data for image, data in page.pictures.items()}
     new |= {
         path: text

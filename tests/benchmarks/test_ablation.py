@@ -13,7 +13,6 @@ import pytest
 
 from benchmarks.ablation.report import merged_rows
 from benchmarks.ablation.run import comparison_line, main, try_rules
-from benchmarks.suites.ablation.code_copy import ROOT, CodeCopy, Replacement, replaced_text
 from benchmarks.suites.ablation.comparison import LEAST_LOSS, compare
 from benchmarks.suites.ablation.pictures import PatternTruth, keep_pictures, pattern_truth, sampled_cases
 from benchmarks.suites.ablation.provoking import CHANGES, FOREIGN, provoking_cases
@@ -21,6 +20,7 @@ from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.rules import RULES
 from benchmarks.suites.ablation.trial import PictureScore, read_without, score_reading
 from benchmarks.suites.ablation.worker import Reading
+from benchmarks.suites.code_copy import ROOT, CodeCopy, Replacement, replaced_text
 from cmpdesign.scene import standard_layout
 from extractor import Status
 

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.suites.ablation.code_copy import CodeCopy, Replacement, environment
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.worker import Reading
+from benchmarks.suites.code_copy import CodeCopy, Replacement, environment
 from benchmarks.suites.scoring.calibration import BEYOND_D2, squared_distances
 from extractor import Status
 
