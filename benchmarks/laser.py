@@ -27,7 +27,7 @@ from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
 from cmpdesign.products.laser.job import LaserJob, LaserPass, make_job
 from cmpdesign.products.laser.library import machines
-from cmpdesign.products.laser.make import make_laser
+from cmpdesign.products.laser.make import prepare_laser
 from cmpdesign.products.laser.paths.beam import Points
 from cmpdesign.products.laser.paths.order import order_cells
 from cmpdesign.products.laser.paths.strokes import loop_strokes
@@ -129,13 +129,13 @@ def format_times_table() -> Table:
             design = make_design(layers, laser__machine=str(machine), fiducials__count="3")
             layout = build_layout(design)
             started, begun = time.perf_counter(), time.process_time()
-            files = make_laser(design, layout).files
+            files = prepare_laser(design, layout).make().files
             wall, seconds = time.perf_counter() - started, time.process_time() - begun
             passes = make_job("", layout, complete_setup(design.laser)).cell_passes
             size = sum(len(content) for content in files.values()) / 1e6
             rows.append((sum(len(one.walls) for one in passes), len(files), size, seconds, wall, limit))
             assert seconds < limit
-            assert files == make_laser(design, layout).files, "the same bytes twice"
+            assert files == prepare_laser(design, layout).make().files, "the same bytes twice"
     columns = {"cells": "d", "files": "d", "MB": ".1f", "CPU s": ".2f", "wall s": ".2f", "limit s": ".0f"}
     return Table("all files of laser/ (figures, 4 formats, sheet, coupon), corners overcut", columns, rows)
 
@@ -162,7 +162,7 @@ def areas_table() -> Table:
 
 def measure() -> Shown:
     """All figures."""
-    make_laser(make_design(3), build_layout(make_design(3)))  # loads what is loaded on first use
+    prepare_laser(make_design(3), build_layout(make_design(3))).make()  # loads what is loaded on first use
     yield areas_table()
     yield travel_table()
     yield format_times_table()

@@ -2,13 +2,14 @@
 
 Every command has its call:
 
+    cmpdesign.init("mine"), build("mine.toml", "out"), check("mine.toml")
     design = cmpdesign.load("tac3d", layers=8)      a design; design.layout, design.check(), design.write("out")
     cmpdesign.size((1280, 960), (24, 18))           a design for a camera and its field of view
     cmpdesign.render(design.layout, noise=2)        a picture with its exact truth
     cmpdesign.verify("layout.json", "photo.png")    a verdict on a picture; extractor.Extractor reads without a verdict
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
-    cmpdesign.kerf, laser_grid, calibrate_camera, calibrate_pattern, run_experiment, export_lerobot, export_zarr
+    cmpdesign.kerf, laser_grid, calibrate_camera, calibrate_pattern, evaluate, export_lerobot, export_zarr
 
 The rooms of the package, each of which imports only rooms above it, left column first:
 
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
     from cmpdesign.api.datasets import dataset as dataset
     from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
+    from cmpdesign.api.designs import build as build
+    from cmpdesign.api.designs import check as check
+    from cmpdesign.api.designs import init as init
     from cmpdesign.api.designs import load as load
     from cmpdesign.api.designs import schema as schema
     from cmpdesign.api.designs import templates as templates
@@ -58,11 +62,11 @@ if TYPE_CHECKING:
     from cmpdesign.api.sequences import recover_run as recover_run
     from cmpdesign.api.sequences import track as track
     from cmpdesign.api.workshop import calibrate_pattern as calibrate_pattern
+    from cmpdesign.api.workshop import evaluate as evaluate
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
     from cmpdesign.api.workshop import kerf as kerf
     from cmpdesign.api.workshop import laser_grid as laser_grid
-    from cmpdesign.api.workshop import run_experiment as run_experiment
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
     from cmpdesign.errors import InputError as InputError
@@ -91,6 +95,7 @@ _HOMES = {
     "ShapeOptions": "cmpdesign.tracking.jobs.options",
     "TrackOptions": "cmpdesign.tracking.jobs.options",
     "Verifier": "cmpdesign.api.pictures",
+    "build": "cmpdesign.api.designs",
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
     "calibrate_force": "cmpdesign.api.force",
@@ -98,11 +103,14 @@ _HOMES = {
     "calibrate_pattern": "cmpdesign.api.workshop",
     "calibrate_rig": "cmpdesign.api.calibration",
     "cameras": "cmpdesign.api.sequences",
+    "check": "cmpdesign.api.designs",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",
+    "evaluate": "cmpdesign.api.workshop",
     "export_lerobot": "cmpdesign.api.workshop",
     "export_zarr": "cmpdesign.api.workshop",
     "extract": "cmpdesign.api.datasets",
+    "init": "cmpdesign.api.designs",
     "kerf": "cmpdesign.api.workshop",
     "laser_grid": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
@@ -119,7 +127,6 @@ _HOMES = {
     "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
     "render_sequence": "cmpdesign.api.pictures",
-    "run_experiment": "cmpdesign.api.workshop",
     "schema": "cmpdesign.api.designs",
     "size": "cmpdesign.proposal.camera_design",
     "templates": "cmpdesign.api.designs",

@@ -8,12 +8,13 @@ from contextvars import ContextVar
 from typing import TypeVar
 
 
-def _ignore(done: int, total: int, unit: str) -> None:
+def _ignore(done: int, total: int | None, unit: str) -> None:
     """Nobody watches."""
 
 
-# (number of finished parts, number of all parts, name of the parts, as in "frames")
-Watch = Callable[[int, int, str], None]
+# (number of finished parts, number of all parts, name of the parts, as in "frames"); a step of a name begins without a
+# number of all parts: (0, None, "reading of pads")
+Watch = Callable[[int, int | None, str], None]
 Item = TypeVar("Item")
 _WATCH: ContextVar[Watch] = ContextVar("watch", default=_ignore)
 
@@ -26,6 +27,11 @@ def watched(watch: Watch) -> Iterator[None]:
         yield
     finally:
         _WATCH.reset(token)
+
+
+def begin(step: str) -> None:
+    """Report that a step begins; the parts that are told next are parts of this step."""
+    _WATCH.get()(0, None, step)
 
 
 def tell(done: int, total: int, unit: str = "parts") -> None:

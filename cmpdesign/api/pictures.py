@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -174,7 +174,6 @@ def render_sequence(
     *,
     size: tuple[int, int] | None = None,
     seed: int | None = None,
-    watch: Callable[[], None] = lambda: None,
 ) -> dict[str, int]:
     """Draw a scene that is a sequence into a video or a folder of images.
 
@@ -184,7 +183,6 @@ def render_sequence(
         output: video (.mp4, .avi, .mkv) or folder to write.
         truth: .npz file for the truth of all frames; None: none.
         size, seed: see ``render``.
-        watch: called after every frame.
 
     Returns:
         Warnings of doubtful parts, each with the number of its first frame.
@@ -198,7 +196,7 @@ def render_sequence(
     file = load_scene(scene, layout, size, seed)
     if file.fps is None:
         raise CmpDesignError(f"{scene} is one picture, no sequence; draw it with render")
-    return write_sequence(file, Path(output), None if truth is None else Path(truth), watch)
+    return write_sequence(file, Path(output), None if truth is None else Path(truth))
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ def track(
     source: AnySource,
     output: str | Path,
     *,
-    watch: Callable[[Any], None] = lambda frame: None,
+    on_frame: Callable[[Any], None] = lambda frame: None,
     **options: Unpack[TrackOptions],
 ) -> TrackDocument:
     """Follow a pattern through a video, a folder or a camera into a table, as the command ``track`` does.
@@ -43,7 +43,7 @@ def track(
         layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
         source: see ``open_source``.
         output: table (.npz, .parquet, .csv), or recording (.mcap, .rrd; without ending a rosbag2 folder).
-        watch: called with every ``extractor.Tracked``.
+        on_frame: called with every ``extractor.Tracked``.
         options: see ``TrackOptions``.
 
     Raises:
@@ -52,7 +52,7 @@ def track(
     """
     from cmpdesign.tracking.jobs.job import follow
 
-    return follow(track_job(layout, source, output, **options), watch)
+    return follow(track_job(layout, source, output, **options), on_frame)
 
 
 def reconstruct(
@@ -62,7 +62,7 @@ def reconstruct(
     source: str | Path | int | Sequence[str | Path | int],
     output: str | Path,
     *,
-    watch: Callable[[Any], None] = lambda frame: None,
+    on_frame: Callable[[Any], None] = lambda frame: None,
     **options: Unpack[ShapeOptions],
 ) -> ReconstructDocument:
     """Reconstruct the surface in space from two or more views, as the command ``reconstruct`` does.
@@ -76,7 +76,7 @@ def reconstruct(
         rest: the pattern at rest: an image, or a frame's number in ``source``; for several sources a sequence.
         source: see ``open_source``; for several cameras a sequence with one for each view.
         output: table (.npz, .parquet, .csv), or recording (.mcap, .rrd; without ending a rosbag2 folder).
-        watch: called with every ``extractor.ShapeFrame``.
+        on_frame: called with every ``extractor.ShapeFrame``.
         options: see ``ShapeOptions``.
 
     Raises:
@@ -85,7 +85,7 @@ def reconstruct(
     """
     from cmpdesign.tracking.jobs.job import follow
 
-    return follow(reconstruct_job(layout, rig, rest, source, output, **options), watch)
+    return follow(reconstruct_job(layout, rig, rest, source, output, **options), on_frame)
 
 
 def recover_run(

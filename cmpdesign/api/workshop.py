@@ -17,6 +17,7 @@ from cmpdesign.watch import tell
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cmpdesign.documents.runs import EvaluateDocument, ExportDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.products.laser.coupon.photo import CouponReading
     from cmpdesign.products.laser.grid.reading import GridReading
@@ -175,7 +176,7 @@ def read_pictures(
     return names, pictures
 
 
-def run_experiment(
+def evaluate(
     experiment: Literal["precision", "response", "reliability", "angles", "designs"],
     output: str | Path,
     designs: Mapping[str, Parameters] | None = None,
@@ -185,10 +186,10 @@ def run_experiment(
     workers: int | None = None,
     sensor: str | Path = "tac3d",
     preset: str = "balanced",
-) -> dict[str, Any]:
+) -> EvaluateDocument:
     """Run an experiment on a simulated sensor, as the commands ``evaluate NAME`` do.
 
-    >>> cmpdesign.run_experiment("designs", "compared", {"ten": load("tac3d"), "eight": load("tac3d", layers=8)})
+    >>> cmpdesign.evaluate("designs", "compared", {"ten": load("tac3d"), "eight": load("tac3d", layers=8)})
 
     Args:
         experiment: the command's name.
@@ -201,12 +202,13 @@ def run_experiment(
         preset: the reader's preset: "balanced" or "accurate".
 
     Returns:
-        The JSON object of report.json.
+        The written files, and the JSON object of report.json.
 
     Raises:
         CmpDesignError: a value out of range, or the folder holds a run under other conditions.
         OutputError: a file cannot be written; finished trials are kept.
     """
+    from cmpdesign.documents.runs import EvaluateDocument
     from cmpdesign.evaluate import experiments
     from cmpdesign.evaluate.defaults import PRESETS, USUAL_TRIALS
     from cmpdesign.evaluate.designs import design_entries
@@ -219,8 +221,8 @@ def run_experiment(
     found = experiments.find_experiment(experiment, compared)
     count = USUAL_TRIALS[experiment] if trials is None else trials
     options = RunOptions(count, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
-    document, _ = experiments.run_experiment(found, options, Path(output))
-    return document
+    report, files = experiments.run_experiment(found, options, Path(output))
+    return EvaluateDocument(written=tuple(map(str, files)), report=report)
 
 
 def export_lerobot(
@@ -232,7 +234,7 @@ def export_lerobot(
     robot: str | None = None,
     images: Sequence[str | Path] = (),
     max_pixels: int = MOST_PIXELS,
-) -> int:
+) -> ExportDocument:
     """Write runs as a LeRobotDataset v3.0, as the command ``export lerobot`` does.
 
     Args:
@@ -244,13 +246,11 @@ def export_lerobot(
         images: video or folder of images of each run, in order; empty: no images.
         max_pixels: largest image that is read, width x height.
 
-    Returns:
-        The number of frames.
-
     Raises:
         CmpDesignError: a library is missing, or the runs or their images cannot be used together.
         OutputError: the data set cannot be written, or the folder exists.
     """
+    from cmpdesign.documents.runs import ExportDocument
     from cmpdesign.tracking.export.lerobot import DataSet, write_lerobot
     from cmpdesign.tracking.export.runs import frames_per_second, require_one_kind, tidy_fps
 
@@ -258,7 +258,8 @@ def export_lerobot(
     require_one_kind(paths)
     rate = frames_per_second(paths) if fps is None else tidy_fps(fps)
     about = DataSet(rate, task, robot, tuple(map(str, images)), max_pixels)
-    return write_lerobot(paths, Path(output), about)
+    frames = write_lerobot(paths, Path(output), about)
+    return ExportDocument(kind="lerobot", written=str(output), episodes=len(paths), frames=frames, fps=rate)
 
 
 def export_zarr(
@@ -267,24 +268,24 @@ def export_zarr(
     *,
     images: Sequence[str | Path] = (),
     max_pixels: int = MOST_PIXELS,
-) -> int:
+) -> ExportDocument:
     """Write runs as a replay buffer in the form of Diffusion Policy, as the command ``export zarr`` does.
 
     Args:
         runs, images, max_pixels: see ``export_lerobot``.
         output: buffer to write; a new .zarr folder.
 
-    Returns:
-        The number of frames.
-
     Raises:
         CmpDesignError, OutputError: see ``export_lerobot``.
     """
+    from cmpdesign.documents.runs import ExportDocument
     from cmpdesign.tracking.export.zarr_buffer import write_zarr
 
     if Path(output).suffix != ".zarr":
         raise CmpDesignError(f"{output}: unknown ending of a replay buffer; expected .zarr")
-    return write_zarr(_paths(runs), Path(output), tuple(map(str, images)), max_pixels)
+    paths = _paths(runs)
+    frames = write_zarr(paths, Path(output), tuple(map(str, images)), max_pixels)
+    return ExportDocument(kind="zarr", written=str(output), episodes=len(paths), frames=frames, fps=None)
 
 
 def _paths(runs: Sequence[str | Path]) -> list[Path]:

@@ -15,6 +15,7 @@ from cmpdesign.cli.commands import (
     build,
     check,
     evaluate,
+    export,
     kerf,
     reconstruct,
     render,
@@ -24,7 +25,6 @@ from cmpdesign.cli.commands import (
 )
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
-from cmpdesign.cli.commands.export import group as export
 from cmpdesign.cli.commands.pages import studio, view
 from cmpdesign.cli.commands.starting import cameras, init, schema, templates
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from cmpdesign.cli.mode import current_mode
-from cmpdesign.cli.terminal import console
+from cmpdesign.cli.terminal import console, print_step
 from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
@@ -58,9 +58,12 @@ class Steps:
                 self._progress.remove_task(task)
             self._progress.add_task(visible(doing), total=None, note="", rate="")
 
-    def tell(self, done: int, total: int, unit: str) -> None:
-        """Show how many of the step's parts are done; see ``cmpdesign.watch``."""
-        if self._progress is not None and self._progress.task_ids:
+    def tell(self, done: int, total: int | None, unit: str) -> None:
+        """Show how many of the step's parts are done, or the next step; see ``cmpdesign.watch``."""
+        if total is None:
+            print_step(f"{unit} begins")
+            self.begin(unit)
+        elif self._progress is not None and self._progress.task_ids:
             task = self._progress.task_ids[-1]
             self._progress.update(task, completed=done, total=total)
             self._progress.update(task, rate=_rate(self._progress, unit))

@@ -13,7 +13,7 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.designs import DesignEntry
 from cmpdesign.evaluate.journal import Journal
 from cmpdesign.evaluate.report.page import Section, report_html
-from cmpdesign.evaluate.runner import RunOptions, Trial, TrialsBar, Work, no_bar, run_trials
+from cmpdesign.evaluate.runner import RunOptions, Trial, Work, run_trials
 from cmpdesign.libraries import require_libraries
 
 Figures = Callable[[Sequence[Trial], Sequence[Mapping[str, Any]]], dict[str, Any]]
@@ -75,7 +75,7 @@ def find_experiment(name: str, designs: Sequence[DesignEntry] = ()) -> Experimen
 
 
 def run_experiment(
-    experiment: Experiment, options: RunOptions, folder: Path, *, bar: TrialsBar = no_bar
+    experiment: Experiment, options: RunOptions, folder: Path
 ) -> tuple[dict[str, Any], list[Path]]:
     """Run the open trials, and write ``report.json`` and ``report.html``.
 
@@ -83,7 +83,6 @@ def run_experiment(
         experiment: the experiment.
         options: the user's options.
         folder: folder of the journal and the report.
-        bar: shows the progress of the trials.
 
     Returns:
         The report's document, and the written files.
@@ -99,9 +98,7 @@ def run_experiment(
     conditions = {"experiment": experiment.name, "version": __version__, **options.values}
     trials = experiment.trials(options)
     with Journal(folder, conditions) as journal:
-        results = run_trials(
-            experiment.work, trials, journal, workers=options.workers, title=experiment.name, bar=bar
-        )
+        results = run_trials(experiment.work, trials, journal, workers=options.workers)
     document = {
         "format": "cmp-evaluation",
         "version": 1,

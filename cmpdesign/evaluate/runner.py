@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluate.journal import Journal
 from cmpdesign.libraries import extra
+from cmpdesign.watch import tell
 from cmpdesign.workers import worker_pool
 
 
@@ -67,15 +68,6 @@ class RunOptions:
 Work = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
-# (title, number of trials, number of trials in the journal) -> function that is called after every trial, with a note.
-TrialsBar = Callable[[str, int, int], AbstractContextManager[Callable[[str], None]]]
-
-
-def no_bar(title: str, total: int, done: int) -> AbstractContextManager[Callable[[str], None]]:
-    """Show nothing."""
-    return nullcontext(lambda note: None)
-
-
 def trial_rng(seed: int, name: str, index: int) -> np.random.Generator:
     """The random stream of one trial, the same in every process and at any time."""
     return np.random.default_rng([seed, zlib.crc32(name.encode("utf-8")), index])
@@ -87,8 +79,6 @@ def run_trials(
     journal: Journal,
     *,
     workers: int,
-    title: str,
-    bar: TrialsBar = no_bar,
 ) -> list[Mapping[str, Any]]:
     """The results of all trials, in their order; trials in the journal are not run again.
 
@@ -97,8 +87,6 @@ def run_trials(
         trials: the trials.
         journal: the results of earlier runs; new results are added.
         workers: number of processes; 1: this process.
-        title: title of the progress bar.
-        bar: shows the progress of the trials.
 
     Raises:
         CmpDesignError: two trials have the same key.
@@ -108,13 +96,11 @@ def run_trials(
         raise CmpDesignError("two trials have the same name")
     open_trials = [trial for trial in trials if trial.key not in journal.results]
     done = len(trials) - len(open_trials)
-    with (
-        bar(title, len(trials), done) as advance,
-        closing(_iterate_results(work, open_trials, workers)) as results,
-    ):
-        for key, result in results:
+    tell(done, len(trials), "trials")
+    with closing(_iterate_results(work, open_trials, workers)) as results:
+        for count, (key, result) in enumerate(results, start=done + 1):
             journal.add(key, result)
-            advance("")
+            tell(count, len(trials), "trials")
     return [journal.results[trial.key] for trial in trials]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,7 +72,6 @@ def build_files(
     camera_px: tuple[int, int] = CAMERA_PX,
     *,
     preset: Preset = "balanced",
-    watch: Callable[[str], None] = lambda name: None,
 ) -> Built:
     """Write the files of a design.
 
@@ -83,7 +82,6 @@ def build_files(
         names: products to make, see ``chosen_products``.
         camera_px: width and height of the camera image that the pattern fills.
         preset: preset of the extractor, for the reading of pads.
-        watch: called with the name of every step, before the step.
 
     Raises:
         CmpDesignError: a product cannot be made; no file has been written.
@@ -97,7 +95,7 @@ def build_files(
 
     folder = Path(folder)
     report = design_report(design, layout, camera_px)
-    made = make_products(names, design, layout, report, camera_px, preset=preset, watch=watch)
+    made = make_products(names, design, layout, report, camera_px, preset=preset)
     pattern = pattern_digest(layout)
     listed = files_with_lists(made.files, product_folders(), folder, pattern)
     stale = find_stale_files(folder, listed, product_folders(), pattern)

@@ -1,9 +1,8 @@
 """The registry of products, and the function that makes them.
 
 A product is added by one line in ``PRODUCTS``. The line names the product's maker as "module:function", so that
-the module is imported only when the product is made. A maker takes ``(design, layout)`` and returns
-``ProductFiles``: files (path relative to the output folder -> content), figures for ``report.json`` (under the
-product's name), and findings for the user.
+the module is imported only when the product is made. A maker takes ``(design, layout)``, checks what can be checked
+before a file is drawn, and returns ``Prepared``: the pad that the product makes, and the product when it is asked for.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cmpdesign.errors import CmpDesignError, parameter
+from cmpdesign.watch import begin
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,26 +30,37 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ProductFiles:
-    """The result of a maker.
+    """A product.
 
     Attributes:
         files: path relative to the output folder, with "/" -> content; the same bytes for the same design.
         figures: measures of the product as JSON values; the product's member in ``report.json``.
         findings: errors and warnings about the product.
         pictures: name -> (H, W, 3) uint8 BGR picture of the product, shown in ``preview.png``.
-        made_pad: the pad that the product makes; the pad is read before the files are written; None without a pad.
     """
 
     files: Mapping[str, str | bytes]
     figures: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     pictures: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A product that can be made.
+
+    Attributes:
+        make: makes the product; a ``CmpDesignError`` where a check needs the drawing and fails.
+        made_pad: the pad that the product makes; the pad is read before the files are written; None without a pad.
+    """
+
+    make: Callable[[], ProductFiles]
     made_pad: MadePad | None = None
 
 
 # The camera that reads a pad, unless another one is given.
 CAMERA_PX = (640, 480)
-Maker = Callable[["Design", "Layout"], ProductFiles]
+Maker = Callable[["Design", "Layout"], Prepared]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +86,13 @@ class Product:
         maker: "module:function" of the ``Maker``.
         where: the file or folder that the product writes; a folder ends with "/".
         usual: True if a plain ``build`` makes the product; other products are made when they are named.
-        pad: "module:function" that makes the product's pad of ``(design, layout)``; empty if it makes no other pad
-            than the products before it.
+        has_pad: the product makes a pad, and no other product before it makes the same.
     """
 
     maker: str
     where: str
     usual: bool = False
-    pad: str = ""
+    has_pad: bool = False
 
 
 PREVIEW, REPORT, AS_MADE = "preview", "report", "as_made"
@@ -91,18 +101,10 @@ PRODUCTS: Mapping[str, Product] = {
     "layout": Product("cmpdesign.products.registry:_make_layout", "layout.json", usual=True),
     # The preview and the report are no ``Maker``s: they show the pictures and figures of the other products.
     PREVIEW: Product("cmpdesign.products.drawing.preview:preview_png", "preview.png", usual=True),
-    "laser": Product(
-        "cmpdesign.products.laser.make:make_laser", "laser/", pad="cmpdesign.products.laser.make:laser_pad"
-    ),
-    "mold": Product(
-        "cmpdesign.products.mold.make:make_mold", "mold/", pad="cmpdesign.products.mold.make:mold_pad"
-    ),
-    "mesh": Product("cmpdesign.products.mold.meshes:make_meshes", "mesh/"),
-    "print": Product(
-        "cmpdesign.products.sheet.print_sheet:make_print_sheet",
-        "print/",
-        pad="cmpdesign.products.sheet.print_sheet:made_pad",
-    ),
+    "laser": Product("cmpdesign.products.laser.make:prepare_laser", "laser/", has_pad=True),
+    "mold": Product("cmpdesign.products.mold.make:prepare_mold", "mold/", has_pad=True),
+    "mesh": Product("cmpdesign.products.mold.meshes:prepare_meshes", "mesh/"),
+    "print": Product("cmpdesign.products.sheet.print_sheet:prepare_print_sheet", "print/", has_pad=True),
     REPORT: Product("cmpdesign.layout.report:report_to_json", "report.json", usual=True),
 }
 USUAL_NAMES = ",".join(name for name, product in PRODUCTS.items() if product.usual)
@@ -139,11 +141,10 @@ def make_products(
     camera_px: tuple[int, int] = CAMERA_PX,
     *,
     preset: Preset = "balanced",
-    watch: Callable[[str], None] = lambda name: None,
 ) -> MadeProducts:
     """Make the named products, and read their pads in the picture of a camera of ``camera_px`` (width, height).
 
-    ``preset`` is the preset of the extractor; ``watch`` is called with the name of every step, before the step.
+    ``preset`` is the preset of the extractor. Every step begins with its name, see ``cmpdesign.watch``.
 
     ``report.json`` is also made when a named product has figures, and ``preview.png`` when one has pictures.
 
@@ -151,10 +152,14 @@ def make_products(
         CmpDesignError: a product cannot be made. No file has been written.
     """
     made: dict[str, ProductFiles] = {}
-    for name in names:
-        if name not in (PREVIEW, REPORT):
-            watch(name)
-            made[name] = _load_maker(name)(design, layout)
+    pads: dict[str, MadePad] = {}  # a mold and its meshes make the same pad
+    drawn = [name for name in PRODUCTS if name in names and name not in (PREVIEW, REPORT)]
+    for number, name in enumerate(drawn, start=1):
+        begin(f"building {name} ({number} of {len(drawn)})" if len(drawn) > 1 else f"building {name}")
+        prepared = prepare(name, design, layout)
+        made[name] = prepared.make()
+        if prepared.made_pad is not None:
+            pads[prepared.made_pad.product] = prepared.made_pad
     pictures = {name: picture for product in made.values() for name, picture in product.pictures.items()}
     if pictures or PREVIEW in names:
         from cmpdesign.products.drawing.preview import preview_png
@@ -164,15 +169,11 @@ def make_products(
     files = {path: content for product in in_order for path, content in product.files.items()}
     figures = {name: product.figures for name, product in made.items() if product.figures}
     findings = [finding for product in made.values() for finding in product.findings]
-    # A mold and its meshes make the same pad.
-    pads = {
-        product.made_pad.product: product.made_pad for product in in_order if product.made_pad is not None
-    }
     readings: dict[str, PadReading] = {}
     if pads:
         from cmpdesign.products.as_made.reading import read_pads
 
-        watch("reading of pads")
+        begin("reading of pads")
         read = read_pads(pads.values(), camera_px, preset)
         files |= read.files
         findings += read.findings
@@ -193,12 +194,15 @@ def pads_as_made(design: Design, layout: Layout) -> tuple[list[MadePad], dict[st
     """
     pads, reasons = [], {}
     for name, product in PRODUCTS.items():
-        if not product.pad:
+        if not product.has_pad:
             continue
         try:
-            pads.append(_load(product.pad)(design, layout))
+            pad = prepare(name, design, layout).made_pad
         except CmpDesignError as error:
             reasons[name] = str(error)
+            continue
+        assert pad is not None
+        pads.append(pad)
     return pads, reasons
 
 
@@ -212,7 +216,7 @@ def refusal_of(name: str, design: Design) -> str:
     from cmpdesign.libraries import MissingLibraryError
 
     try:
-        _load(PRODUCTS[name].pad)(design, build_layout(design))
+        prepare(name, design, build_layout(design))
     except MissingLibraryError:
         raise
     except CmpDesignError as error:
@@ -220,25 +224,25 @@ def refusal_of(name: str, design: Design) -> str:
     return ""
 
 
-def _load_maker(name: str) -> Maker:
-    maker: Maker = _load(PRODUCTS[name].maker)
-    return maker
+def prepare(name: str, design: Design, layout: Layout) -> Prepared:
+    """A product of a design, checked and not yet drawn.
+
+    Raises:
+        CmpDesignError: the product cannot be made.
+    """
+    module, _, function = PRODUCTS[name].maker.partition(":")
+    maker: Maker = getattr(import_module(module), function)
+    return maker(design, layout)
 
 
-def _load(place: str) -> Any:
-    """The function at "module:function"."""
-    module, _, function = place.partition(":")
-    return getattr(import_module(module), function)
-
-
-def _make_svg(design: Design, layout: Layout) -> ProductFiles:
+def _make_svg(design: Design, layout: Layout) -> Prepared:
     from cmpdesign.products.drawing.svg import layout_to_svg
 
     text = layout_to_svg(layout, ids=design.print_ids, scale=design.print_scale, mirror=design.print_mirror)
-    return ProductFiles({PRODUCTS["svg"].where: text})
+    return Prepared(lambda: ProductFiles({PRODUCTS["svg"].where: text}))
 
 
-def _make_layout(design: Design, layout: Layout) -> ProductFiles:
+def _make_layout(design: Design, layout: Layout) -> Prepared:
     from cmpdesign.files.layout_json import layout_to_json
 
-    return ProductFiles({PRODUCTS["layout"].where: layout_to_json(layout)})
+    return Prepared(lambda: ProductFiles({PRODUCTS["layout"].where: layout_to_json(layout)}))

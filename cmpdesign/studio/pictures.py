@@ -41,7 +41,7 @@ def laser_document(fields: object) -> dict[str, Any]:
 
     from cmpdesign.products.laser.figures import pass_timing
     from cmpdesign.products.laser.job import make_job
-    from cmpdesign.products.laser.make import laser_pad
+    from cmpdesign.products.laser.make import prepare_laser
     from cmpdesign.products.laser.paths.timing import begin_times_s
     from cmpdesign.products.laser.setup import complete_setup
 
@@ -69,7 +69,9 @@ def laser_document(fields: object) -> dict[str, Any]:
                 "time_s": pass_timing(job, one).time_s,
             }
         )
-    made = laser_pad(design, design.layout).layout.colored_outlines_mm + job.origin_mm
+    pad = prepare_laser(design, design.layout).made_pad
+    assert pad is not None
+    made = pad.layout.colored_outlines_mm + job.origin_mm
     return {
         "passes": passes,
         "size_mm": [job.extent_mm.right - left, top - job.extent_mm.bottom],

@@ -59,15 +59,15 @@ class TrackingRun:
     warnings: tuple[str, ...] = ()
     live: LiveView | None = None
 
-    def go(self, watch: Callable[[Any], None]) -> None:
-        """Track to the end; ``watch`` is called with every tracked frame.
+    def go(self, on_frame: Callable[[Any], None]) -> None:
+        """Track to the end; ``on_frame`` is called with every tracked frame.
 
         Raises:
             OutputError: a file could not be written; the other files are complete, and the message names them.
         """
         failures: list[str] = []
         try:
-            self._track(watch)
+            self._track(on_frame)
         except OutputError as error:
             failures.append(str(error))
         finally:
@@ -82,7 +82,7 @@ class TrackingRun:
             if self.live.wait(WAIT_STEP_S):
                 return
 
-    def _track(self, watch: Callable[[Any], None]) -> None:
+    def _track(self, on_frame: Callable[[Any], None]) -> None:
         self._wait_for_viewer()
         last_s = float("-inf")
         for frame in self.source.frames():
@@ -100,7 +100,7 @@ class TrackingRun:
             self.statistics.add(tracked)
             if self.overlay is not None:
                 self.overlay.add(frame.image, tracked, self.tracker.rest)
-            watch(tracked)
+            on_frame(tracked)
             if self.stop.is_requested:
                 self.ended_early = f"stopped by Ctrl-C after {self.statistics.frames} frames"
                 return

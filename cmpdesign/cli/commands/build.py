@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,9 +16,9 @@ from cmpdesign.cli.options.designs import (
     parse_overrides,
 )
 from cmpdesign.cli.options.images import PresetOption
-from cmpdesign.cli.progress import Steps, working
+from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
-from cmpdesign.products.registry import PREVIEW, PRODUCTS, REPORT, USUAL_NAMES, chosen_products
+from cmpdesign.products.registry import PRODUCTS, USUAL_NAMES, chosen_products
 
 if TYPE_CHECKING:
     from cmpdesign.layout.report import DesignReport
@@ -67,8 +66,7 @@ def build(
         f"{parameters.name}: layout of {len(layout.marker_xy_mm)} markers, digest {layout.digest[:12]}"
     )
     with working("building") as steps, watched(steps.tell):
-        watch = _watch(steps, sum(name not in (PREVIEW, REPORT) for name in names))
-        built = build_files(parameters, layout, output, names, camera_px, preset=preset, watch=watch)
+        built = build_files(parameters, layout, output, names, camera_px, preset=preset)
     for path in built.written:
         say(f"wrote {printable_path(path)}")
     for path in built.removed:
@@ -95,20 +93,6 @@ def build(
         ),
         0 if built.works else EXIT_NOT_PASSED,
     )
-
-
-def _watch(steps: Steps, number: int) -> Callable[[str], None]:
-    """The function that is called with the name of each product or other step before the product is made."""
-    begun = 0
-
-    def watch(name: str) -> None:
-        nonlocal begun
-        begun += 1
-        product = f"building {name} ({begun} of {number})" if number > 1 else f"building {name}"
-        steps.begin(product if begun <= number else name)
-        print_step(f"{name} begins")
-
-    return watch
 
 
 def print_report(report: DesignReport) -> None:

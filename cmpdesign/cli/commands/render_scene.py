@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmpdesign.cli.options.paths import require_suffix
-from cmpdesign.cli.progress import progress_bar
+from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.watch import watched
 
 if TYPE_CHECKING:
     from cmpdesign.scene.files.scene_file import SceneFile
@@ -95,8 +96,8 @@ def _finish(
 def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
     from cmpdesign.scene.files.sequence import write_sequence
 
-    with progress_bar("rendering", file.frames, unit="frames") as advance:
-        warnings = write_sequence(file, output, truth, lambda: advance(""))
+    with working("rendering") as steps, watched(steps.tell):
+        warnings = write_sequence(file, output, truth)
     _print_scene_warnings(warnings, file)
     _finish(file, output, truth, f"{file.frames} frames of {_format_size(file)} at {file.fps:g} fps", None)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from cmpdesign.design.design import Design
 from cmpdesign.files.images import to_png
+from cmpdesign.layout.checks import Finding
 from cmpdesign.layout.layout import Layout
-from cmpdesign.products.as_made.made_pad import MadePad
-from cmpdesign.products.laser.as_made import made_pad, measure_as_made
+from cmpdesign.products.laser.as_made import PassFigures, made_pad, measure_as_made
 from cmpdesign.products.laser.as_made_svg import as_made_svg
 from cmpdesign.products.laser.checks import as_made_findings, path_findings, require_no_errors, setup_findings
 from cmpdesign.products.laser.coupon.job import coupon_job
@@ -19,14 +20,14 @@ from cmpdesign.products.laser.formats.gcode import drawing_to_gcode
 from cmpdesign.products.laser.formats.lightburn import drawing_to_lightburn
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
 from cmpdesign.products.laser.grid.job import grid_job
-from cmpdesign.products.laser.job import make_job
+from cmpdesign.products.laser.job import LaserJob, make_job
 from cmpdesign.products.laser.job_sheet import job_sheet_html
 from cmpdesign.products.laser.process_sheet import bill_of_materials, pass_pictures, process_sheet
 from cmpdesign.products.laser.setup import complete_setup
 from cmpdesign.products.process_sheet.html import sheet_to_html
 from cmpdesign.products.process_sheet.pdf import sheet_to_pdf
 from cmpdesign.products.process_sheet.steps import materials_csv
-from cmpdesign.products.registry import ProductFiles
+from cmpdesign.products.registry import Prepared, ProductFiles
 from cmpdesign.watch import tell
 
 FOLDER = "laser"
@@ -38,32 +39,30 @@ FORMATS: Mapping[str, Callable[[LaserDrawing], str]] = {
 }
 
 
-def laser_pad(design: Design, layout: Layout) -> MadePad:
-    """The pad as carved.
-
-    Raises:
-        DesignError: see ``make_laser``.
-    """
-    job = make_job(design.name, layout, complete_setup(design.laser))
-    require_no_errors(setup_findings(design, job))
-    require_no_errors(as_made_findings(job, measure_as_made(job)))
-    return made_pad(job)
-
-
-def make_laser(design: Design, layout: Layout) -> ProductFiles:
-    """Make the folder ``laser/``.
+def prepare_laser(design: Design, layout: Layout) -> Prepared:
+    """The folder ``laser/`` and the pad as carved.
 
     Raises:
         DesignError: the machine or material is unknown, or a check of the job fails; every reason in one line.
     """
     job = make_job(design.name, layout, complete_setup(design.laser))
     warnings = require_no_errors(setup_findings(design, job))
+    figures = measure_as_made(job)
+    warnings += require_no_errors(as_made_findings(job, figures))
+    return Prepared(partial(_make_laser, job, figures, warnings), made_pad(job))
+
+
+def _make_laser(
+    job: LaserJob, figures: tuple[PassFigures, ...], warnings: tuple[Finding, ...]
+) -> ProductFiles:
+    """Make the files.
+
+    Raises:
+        DesignError: a check of the paths fails.
+    """
     require_no_errors(path_findings(job))
     drawn = len(job.passes) + 3  # a drawing a pass, one of all, coupon and grid
-    tell(1, drawn + 3)
-    figures = measure_as_made(job)
     tell(2, drawn + 3)
-    warnings += require_no_errors(as_made_findings(job, figures))
     timings = tuple(pass_timing(job, laser_pass) for laser_pass in job.passes)
     files: dict[str, str | bytes] = {}
     all_passes = job_drawing(job)
@@ -82,6 +81,6 @@ def make_laser(design: Design, layout: Layout) -> ProductFiles:
     files[f"{FOLDER}/process-sheet.html"] = sheet_to_html(sheet, "pictures")
     files[f"{FOLDER}/process-sheet.pdf"] = sheet_to_pdf(sheet, pictures)
     files[f"{FOLDER}/materials.csv"] = materials_csv(bill_of_materials(job))
-    made = ProductFiles(files, job_figures(job, figures, timings), warnings, made_pad=made_pad(job))
+    made = ProductFiles(files, job_figures(job, figures, timings), warnings)
     tell(drawn + 3, drawn + 3)
     return made

@@ -10,7 +10,6 @@ import numpy as np
 from cmpdesign.design.design import Design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import COLORS
-from cmpdesign.products.as_made.made_pad import MadePad
 from cmpdesign.products.mold.checks.findings import (
     boss_volume_mm3,
     check_mold,
@@ -25,7 +24,7 @@ from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.solids.loops import frustum_volume_mm3
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, make_stack
 from cmpdesign.products.mold.step.assembly import Assembly, PartPlace, assembly_to_step
-from cmpdesign.products.registry import ProductFiles
+from cmpdesign.products.registry import Prepared, ProductFiles
 
 FOLDER = "mold"
 # Gap between the operations in the assembly.
@@ -33,34 +32,27 @@ OPERATION_SPACING_MM = 10.0
 BASE_OPERATION = "1-base"
 
 
-def make_mold(design: Design, layout: Layout) -> ProductFiles:
-    """Make the STEP files of every part and of the assembly.
-
-    Raises:
-        DesignError: the mold cannot be made; no solid has been built.
-        MoldError: a solid is open, invalid or of another volume than computed.
-    """
-    stack = make_stack(design, layout)
-    findings = check_mold(stack)
-    require_no_errors(findings)
-    parts = make_parts(stack)
-    finished = finish_parts(design, layout, parts)
-    step_files = {name: part.step_file for name, part in finished.items()}
-    files: dict[str, str | bytes] = {f"{FOLDER}/{name}.step": content for name, content in step_files.items()}
-    files[f"{FOLDER}/assembly.step"] = assembly_to_step(make_assembly(stack, parts), step_files)
-    figures = {"parts": {name: part.figures for name, part in finished.items()}, **mold_figures(stack)}
-    return ProductFiles(files, figures, tuple(findings), made_pad=made_pad(layout, stack))
-
-
-def mold_pad(design: Design, layout: Layout) -> MadePad:
-    """The pad as cast; no solid is built.
+def prepare_mold(design: Design, layout: Layout) -> Prepared:
+    """The STEP files of every part and of the assembly, and the pad as cast; no solid is built yet.
 
     Raises:
         DesignError: the mold cannot be made.
     """
     stack = make_stack(design, layout)
-    require_no_errors(check_mold(stack))
-    return made_pad(layout, stack)
+    findings = check_mold(stack)
+    require_no_errors(findings)
+
+    def make() -> ProductFiles:
+        """Build the solids; a ``MoldError`` for one that is open, invalid or of another volume than computed."""
+        parts = make_parts(stack)
+        finished = finish_parts(design, layout, parts)
+        step_files = {name: part.step_file for name, part in finished.items()}
+        files: dict[str, str | bytes] = {f"{FOLDER}/{name}.step": data for name, data in step_files.items()}
+        files[f"{FOLDER}/assembly.step"] = assembly_to_step(make_assembly(stack, parts), step_files)
+        figures = {"parts": {name: part.figures for name, part in finished.items()}, **mold_figures(stack)}
+        return ProductFiles(files, figures, tuple(findings))
+
+    return Prepared(make, made_pad(layout, stack))
 
 
 def mold_figures(stack: MoldStack) -> dict[str, Any]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cmpdesign.design.design import Design
 from cmpdesign.files.images import to_png
+from cmpdesign.layout.checks import Finding
 from cmpdesign.layout.layout import Layout
 from cmpdesign.libraries import extra, require_libraries
 from cmpdesign.products.mesh.glb import meshes_to_glb
@@ -30,7 +32,7 @@ from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
 from cmpdesign.products.process_sheet.html import sheet_to_html
 from cmpdesign.products.process_sheet.pdf import sheet_to_pdf
 from cmpdesign.products.process_sheet.steps import materials_csv
-from cmpdesign.products.registry import ProductFiles
+from cmpdesign.products.registry import Prepared, ProductFiles
 
 FOLDER = "mesh"
 # Tolerance of a mesh's volume, as a share: of flat-sided solids, and of smooth crowns and pins (error of chords).
@@ -41,17 +43,27 @@ APART_MM = 5.0
 OPACITY = {"base": 0.35, "cover": 0.35}
 
 
-def make_meshes(design: Design, layout: Layout) -> ProductFiles:
-    """Make the triangle meshes of the mold's parts (as printed) and of the pad's silicone layers.
+def prepare_meshes(design: Design, layout: Layout) -> Prepared:
+    """The triangle meshes of the mold's parts (as printed) and of the pad's silicone layers, and the pad as cast.
 
     Raises:
         DesignError: the mold cannot be made.
-        MoldError: a mesh is open, inconsistently wound or of another volume than computed.
     """
     require_libraries("cad", "OCP", "trimesh", "lib3mf", "scipy", "reportlab")
     stack = make_stack(design, layout)
     findings = check_mold(stack)
     require_no_errors(findings)
+    return Prepared(partial(_make_meshes, design, layout, stack, findings), made_pad(layout, stack))
+
+
+def _make_meshes(
+    design: Design, layout: Layout, stack: MoldStack, findings: Sequence[Finding]
+) -> ProductFiles:
+    """Make the files.
+
+    Raises:
+        MoldError: a mesh is open, inconsistently wound or of another volume than computed.
+    """
     figures: dict[str, Any] = {}
     parts = make_parts(stack)
     meshes: dict[str, PartMesh] = results_of_parts(f"{__name__}:mesh_named_parts", design, layout, parts)
@@ -74,7 +86,7 @@ def make_meshes(design: Design, layout: Layout) -> ProductFiles:
     files[f"{FOLDER}/job-sheet.html"] = sheet_to_html(sheet, "pictures")
     files[f"{FOLDER}/job-sheet.pdf"] = sheet_to_pdf(sheet, pngs)
     files[f"{FOLDER}/materials.csv"] = materials_csv(bill_of_materials(stack, parts))
-    return ProductFiles(files, figures, tuple(findings), pictures, made_pad(layout, stack))
+    return ProductFiles(files, figures, tuple(findings), pictures)
 
 
 class PartMesh(NamedTuple):
@@ -121,7 +133,7 @@ def _add_checked_figures(
     """Check a mesh with trimesh, and add its figures to ``figures``; the mesh.
 
     Raises:
-        MoldError: see ``make_meshes``.
+        MoldError: see ``prepare_meshes``.
     """
     with extra("cad"):
         import trimesh

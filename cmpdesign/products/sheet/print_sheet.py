@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from cmpdesign.layout.outline import corner_offsets
 from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.as_made.made_pad import Cause, MadePad, make_pad
-from cmpdesign.products.registry import ProductFiles
+from cmpdesign.products.registry import Prepared, ProductFiles
 from cmpdesign.products.sheet.film import film_pages
 from cmpdesign.products.sheet.key import BAR_MM, CODE_MM, THICK_MM, X_BAR, Y_BAR, SheetKey
 from cmpdesign.products.sheet.page import (
@@ -45,8 +47,17 @@ TEXT_MM = 2.6
 Points = NDArray[np.float64]
 
 
-def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
-    """Make ``print/sheet.svg``, ``print/sheet.pdf`` and ``print/film.pdf``.
+def prepare_print_sheet(design: Design, layout: Layout) -> Prepared:
+    """``print/sheet.svg``, ``print/sheet.pdf`` and ``print/film.pdf``, and the pad as printed.
+
+    Raises:
+        DesignError: nothing of a cell stays.
+    """
+    return Prepared(partial(_make_print_sheet, design, layout), made_pad(design, layout))
+
+
+def _make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
+    """Make the files.
 
     Raises:
         DesignError: no pad fits on the page, or fewer pads fit than the design states.
@@ -63,7 +74,7 @@ def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
         "film": side.film,
         "mirrored": side.mirror,
     }
-    return ProductFiles(files, figures, made_pad=made_pad(design, layout))
+    return ProductFiles(files, figures)
 
 
 def made_pad(design: Design, layout: Layout) -> MadePad:

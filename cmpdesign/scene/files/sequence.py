@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from cmpdesign.errors import CmpDesignError
@@ -10,18 +9,16 @@ from cmpdesign.scene.drawing.render import render
 from cmpdesign.scene.files.frame_writer import open_frame_writer
 from cmpdesign.scene.files.scene_file import SceneFile
 from cmpdesign.scene.truth import Truth, save_truths
+from cmpdesign.watch import told
 
 
-def write_sequence(
-    file: SceneFile, output: Path, truth: Path | None, watch: Callable[[], None]
-) -> dict[str, int]:
+def write_sequence(file: SceneFile, output: Path, truth: Path | None) -> dict[str, int]:
     """Draw every frame of a sequence.
 
     Args:
         file: a scene file with [sequence].
         output: video or folder to write.
         truth: .npz file for the truth of all frames, if any.
-        watch: called after every frame.
 
     Returns:
         Warnings of doubtful parts, each with the number of its first frame.
@@ -36,13 +33,12 @@ def write_sequence(
     truths: list[Truth] = []
     warnings: dict[str, int] = {}
     try:
-        for scene in file.scenes():
+        for scene in told(file.scenes(), file.frames, "frames"):
             rendered = render(scene, size=file.size_px)
             writer.add(rendered.image)
             truths.append(rendered.truth)
             for warning in rendered.warnings:
                 warnings.setdefault(warning, scene.frame)
-            watch()
         if truth is not None:
             save_truths(truths, [file.time_s(frame) for frame in range(file.frames)], truth)
         writer.close()

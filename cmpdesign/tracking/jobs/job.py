@@ -281,7 +281,7 @@ class ReconstructJob:
         return images if len(images) > 1 else images[0]
 
 
-def follow(job: Job[Summary], watch: Callable[[Any], None]) -> Summary:
+def follow(job: Job[Summary], on_frame: Callable[[Any], None]) -> Summary:
     """Follow a source to its end and write the summary; after a failure the summary covers the frames so far.
 
     Raises:
@@ -289,7 +289,7 @@ def follow(job: Job[Summary], watch: Callable[[Any], None]) -> Summary:
     """
     run = job.prepare()
     try:
-        run.go(watch)
+        run.go(on_frame)
     except OutputError:
         with suppress(OutputError):
             write_summary(run, job)

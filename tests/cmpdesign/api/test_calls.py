@@ -23,11 +23,8 @@ from extractor import Extractor, LayoutError, Tracker
 from tests.support.command import commands, run
 
 ROOT = Path(__file__).parents[3]
-# What a command is called in Python where the name differs; `design.write` and `design.check` are methods.
+# What a command of a group is called in Python.
 CALLS = {
-    "build": "load",
-    "check": "load",
-    "evaluate": "run_experiment",
     "calibrate camera": "calibrate_camera",
     "calibrate force": "calibrate_force",
     "calibrate gel": "calibrate_gel",
@@ -36,7 +33,7 @@ CALLS = {
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
 }
-NOT_CALLS = {"init", "studio", "view"}  # of files for editors; of a page
+NOT_CALLS = {"studio", "view"}  # of a page
 
 
 @pytest.fixture(scope="module")
@@ -260,7 +257,7 @@ def test_track_writes_what_the_command_writes(design: cmpdesign.Design, tmp_path
         rest=0,
         fps=10,
         quiver=tmp_path / "q.png",
-        watch=seen.append,
+        on_frame=seen.append,
     )
     a, b = (cmpdesign.load_run(tmp_path / name) for name in ("a.npz", "b.npz"))
     assert np.array_equal(a.arrays["displacement_mm"], b.arrays["displacement_mm"], equal_nan=True)

@@ -33,7 +33,7 @@ def interrupted(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def all_of(folder: Path, work: Any = drawn, trials: list[Trial] = TRIALS, workers: int = 1) -> list[Any]:
     with Journal(folder, CONDITIONS) as kept:
-        return run_trials(work, trials, kept, workers=workers, title="test")
+        return run_trials(work, trials, kept, workers=workers)
 
 
 def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from cmpdesign.products.drawing.preview import draw_preview
 from cmpdesign.products.registry import (
     PRODUCTS,
     USUAL_NAMES,
+    Prepared,
     Product,
     ProductFiles,
     chosen_products,
@@ -34,8 +35,9 @@ FINDING = Finding("glue", 1.0, 2.0, "mm", "use more", "warning")
 def with_ruler(monkeypatch: pytest.MonkeyPatch) -> None:
     """A product as another module would add it: one line in the registry, one function."""
 
-    def ruler(design: Design, layout: Layout) -> ProductFiles:
-        return ProductFiles({"ruler/ruler.txt": design.pattern}, {"ticks": len(layout.edges)}, (FINDING,))
+    def ruler(design: Design, layout: Layout) -> Prepared:
+        files = {"ruler/ruler.txt": design.pattern}
+        return Prepared(lambda: ProductFiles(files, {"ticks": len(layout.edges)}, (FINDING,)))
 
     module = ModuleType("ruler")
     module.ruler = ruler  # type: ignore[attr-defined]
@@ -67,7 +69,8 @@ def test_pictures_of_a_product_are_shown_in_the_preview(monkeypatch: pytest.Monk
     tall, wide = np.zeros((400, 200, 3), np.uint8), np.full((200, 400, 3), (0, 0, 255), np.uint8)
     module = ModuleType("camera")
     # type: ignore[attr-defined]
-    module.make = lambda design, layout: ProductFiles({"a.txt": ""}, pictures={"tall": tall, "wide": wide})
+    product = ProductFiles({"a.txt": ""}, pictures={"tall": tall, "wide": wide})
+    module.make = lambda design, layout: Prepared(lambda: product)
     monkeypatch.setitem(sys.modules, "camera", module)
     monkeypatch.setattr(products, "PRODUCTS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
     files, _ = make("camera")

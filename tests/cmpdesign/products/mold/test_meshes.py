@@ -25,7 +25,7 @@ from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold import meshes as product
 from cmpdesign.products.mold.finish import MoldError
 from cmpdesign.products.mold.job_sheet import bill_of_materials, process_sheet, weighings
-from cmpdesign.products.mold.meshes import make_meshes, make_part_mesh
+from cmpdesign.products.mold.meshes import make_part_mesh, prepare_meshes
 from cmpdesign.products.mold.pad import pad_meshes
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.pictures import exploded_meshes
@@ -38,7 +38,7 @@ HONEYCOMB = load("honeycomb", {"layers": "2"})
 
 @pytest.fixture(scope="module")
 def made() -> ProductFiles:
-    return make_meshes(HONEYCOMB, build_layout(HONEYCOMB))
+    return prepare_meshes(HONEYCOMB, build_layout(HONEYCOMB)).make()
 
 
 def content(made: ProductFiles, name: str) -> bytes:
@@ -122,7 +122,7 @@ def test_an_open_mesh_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(product, "pad_meshes", lambda stack: [(tent, tent.volume_mm3())])
     design = load("honeycomb", {"layers": "1"})
     with pytest.raises(MoldError, match="tent: watertight False"):
-        make_meshes(design, build_layout(design))
+        prepare_meshes(design, build_layout(design)).make()
 
 
 @pytest.mark.parametrize("crown", [pytest.param("sphere", marks=pytest.mark.slow), "cylinder"])

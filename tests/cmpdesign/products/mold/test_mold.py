@@ -16,7 +16,7 @@ from cmpdesign import build_layout, load
 from cmpdesign.errors import DesignError
 from cmpdesign.products.mold import make, pad, processes
 from cmpdesign.products.mold.checks.findings import check_mold, require_no_errors
-from cmpdesign.products.mold.meshes import make_meshes
+from cmpdesign.products.mold.meshes import prepare_meshes
 from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.shapes import caps
 from cmpdesign.products.mold.shapes.cavities import cavities, seen_inset_mm
@@ -206,7 +206,7 @@ IMPOSSIBLE = {
 }
 
 
-@pytest.mark.parametrize("product", [make.make_mold, make_meshes])
+@pytest.mark.parametrize("product", [make.prepare_mold, prepare_meshes])
 @pytest.mark.parametrize("name", IMPOSSIBLE)
 def test_what_cannot_be_made_is_refused_before_any_solid(
     name: str, product: Maker, monkeypatch: pytest.MonkeyPatch
@@ -215,7 +215,7 @@ def test_what_cannot_be_made_is_refused_before_any_solid(
     nothing_is_built(monkeypatch)
     design = load("honeycomb", {"layers": "3", **values})
     with pytest.raises(DesignError, match=message):
-        product(design, build_layout(design))
+        product(design, build_layout(design)).make()
 
 
 def nothing_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,12 +230,12 @@ def nothing_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(where, way, lambda *_, **__: pytest.fail("geometry was built"))
 
 
-@pytest.mark.parametrize("product", [make.make_mold, make_meshes])
+@pytest.mark.parametrize("product", [make.prepare_mold, prepare_meshes])
 def test_building_would_be_seen(product: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     nothing_is_built(monkeypatch)
     design = load("honeycomb", {"layers": "2"})
     with pytest.raises(pytest.fail.Exception, match="geometry was built"):
-        product(design, build_layout(design))
+        product(design, build_layout(design)).make()
 
 
 def test_resin_that_inhibits_the_cure_is_reported() -> None:
@@ -344,7 +344,7 @@ def test_frustum_of_circles() -> None:
 def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> None:
     design = load("honeycomb", {"layers": "1"})
     layout = build_layout(design)
-    alone = make.make_mold(design, layout)
+    alone = make.prepare_mold(design, layout).make()
     monkeypatch.setattr(processes, "MIN_BOSSES_FOR_TWO", 0)
     helped: list[object] = []
     process = processes.subprocess.Popen
@@ -352,7 +352,7 @@ def test_two_processes_make_what_one_makes(monkeypatch: pytest.MonkeyPatch) -> N
         processes.subprocess, "Popen", lambda *args, **more: helped.append(args) or process(*args, **more)
     )
     monkeypatch.setattr(processes, "available_cores", lambda: 2)
-    together = make.make_mold(design, layout)
+    together = make.prepare_mold(design, layout).make()
     assert len(helped) == 2
     assert list(together.files.items()) == list(alone.files.items())
     assert together.figures == alone.figures
@@ -364,13 +364,13 @@ def test_a_helper_that_fails_is_an_error(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(processes, "available_cores", lambda: 2)
     monkeypatch.setattr(processes, "__name__", "cmpdesign.mold.absent")
     with pytest.raises(RuntimeError, match=r"(?s)a process failed: .*No module named"):
-        make.make_mold(design, build_layout(design))
+        make.prepare_mold(design, build_layout(design)).make()
 
 
 def test_assembly_holds_every_part_where_it_is_used() -> None:
     design = load("honeycomb", {"layers": "2"})
     layout = build_layout(design)
-    content = make.make_mold(design, layout).files["mold/assembly.step"]
+    content = make.prepare_mold(design, layout).make().files["mold/assembly.step"]
     assert isinstance(content, bytes)
     numbers = [int(n) for n in re.findall(rb"^#(\d+) = ", content, flags=re.MULTILINE)]
     assert numbers == list(range(1, len(numbers) + 1))
@@ -410,7 +410,7 @@ def test_build123d_reads_names_colors_and_places(tmp_path: Path) -> None:
     from build123d import import_step
 
     design = load("honeycomb", {"layers": "2"})
-    files = make.make_mold(design, build_layout(design)).files
+    files = make.prepare_mold(design, build_layout(design)).make().files
     for name in ("boss-red", "assembly"):
         content = files[f"mold/{name}.step"]
         assert isinstance(content, bytes)

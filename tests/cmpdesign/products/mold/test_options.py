@@ -11,7 +11,7 @@ from cmpdesign.products.mold.checks.findings import check_mold
 from cmpdesign.products.mold.make import mold_figures
 from cmpdesign.products.mold.parts import make_parts
 from cmpdesign.products.mold.stack.stack import make_stack
-from cmpdesign.products.sheet.print_sheet import make_print_sheet
+from cmpdesign.products.sheet.print_sheet import prepare_print_sheet
 
 CROWNS = {
     "none": {},
@@ -78,6 +78,6 @@ def test_options_that_are_not_used_are_named() -> None:
 def test_every_option_of_a_sheet_has_an_effect(field: str) -> None:
     def sheet(**values: str) -> str | bytes:
         design = load("honeycomb", {"layers": "3", **values})
-        return make_print_sheet(design, build_layout(design)).files["print/sheet.svg"]
+        return prepare_print_sheet(design, build_layout(design)).make().files["print/sheet.svg"]
 
     assert sheet(**{f"sheet.{field}": SHEET[field]}) != sheet()

@@ -9,14 +9,14 @@ import resvg_py
 
 from cmpdesign import build_layout, load
 from cmpdesign.errors import DesignError
-from cmpdesign.products.sheet.print_sheet import make_print_sheet
+from cmpdesign.products.sheet.print_sheet import prepare_print_sheet
 
 DPI = 254  # 10 px/mm
 
 
 def sheet_svg(**values: str) -> str:
     design = load("honeycomb", {"layers": "6", "sheet.pads": "1", **values})
-    svg = make_print_sheet(design, build_layout(design)).files["print/sheet.svg"]
+    svg = prepare_print_sheet(design, build_layout(design)).make().files["print/sheet.svg"]
     assert isinstance(svg, str)
     return svg
 

@@ -21,7 +21,7 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.files.resolution import resolution_dpi
 from cmpdesign.products.sheet.key import SheetKey, parse_key
 from cmpdesign.products.sheet.page import FilledPolygons, TextLine
-from cmpdesign.products.sheet.print_sheet import made_pad, make_print_page, make_print_sheet
+from cmpdesign.products.sheet.print_sheet import made_pad, make_print_page, prepare_print_sheet
 from cmpdesign.products.sheet.scan import SheetBars, SheetReading, find_sheet_bars, measure_sheet
 from cmpdesign.products.sheet.verdict import PERSPECTIVE_TOLERANCE_MM
 from extractor import Extractor, Status, parse_layout
@@ -41,7 +41,7 @@ def scan() -> Pixels:
     import resvg_py
 
     parameters = design()
-    svg = make_print_sheet(parameters, build_layout(parameters)).files["print/sheet.svg"]
+    svg = prepare_print_sheet(parameters, build_layout(parameters)).make().files["print/sheet.svg"]
     assert isinstance(svg, str)
     png = bytes(resvg_py.svg_to_bytes(svg_string=svg, dpi=int(DPI)))
     return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR))
@@ -53,7 +53,7 @@ def pdf_scan() -> Pixels:
     import pypdfium2
 
     parameters = design()
-    pdf = make_print_sheet(parameters, build_layout(parameters)).files["print/sheet.pdf"]
+    pdf = prepare_print_sheet(parameters, build_layout(parameters)).make().files["print/sheet.pdf"]
     assert isinstance(pdf, bytes)
     page = pypdfium2.PdfDocument(pdf)[0]
     return np.ascontiguousarray(page.render(scale=DPI / 72).to_numpy()[:, :, :3])
@@ -172,7 +172,7 @@ def test_a_film_has_its_side_its_boxes_and_a_white_layer_if_clear(
 
     parameters = design(**{"mirrored": mirrored, "sheet.film": film, "sheet.bleed_mm": "1.5"})
     layout = build_layout(parameters)
-    content = make_print_sheet(parameters, layout).files["print/film.pdf"]
+    content = prepare_print_sheet(parameters, layout).make().files["print/film.pdf"]
     pages = list(pypdfium2.PdfDocument(content))
     assert len(pages) == 1 + (film == "clear")
     for page in pages:
@@ -328,7 +328,8 @@ def test_verify_tells_sheets_from_views(scan: Pixels, tmp_path: Path) -> None:
 def test_pdf_is_true_to_size_and_the_same_again() -> None:
     parameters = design()
     first, second = (
-        make_print_sheet(parameters, build_layout(parameters)).files["print/sheet.pdf"] for _ in range(2)
+        prepare_print_sheet(parameters, build_layout(parameters)).make().files["print/sheet.pdf"]
+        for _ in range(2)
     )
     assert isinstance(first, bytes) and first == second and first.startswith(b"%PDF")
     assert b"/MediaBox [ 0 0 595.2756 841.8898 ]" in first
@@ -345,7 +346,7 @@ def pad_alone(renderer: str, **values: str) -> tuple[Points, Pixels]:
 
     parameters = design(**{"sheet.pads": "1", **values})
     layout = build_layout(parameters)
-    files = make_print_sheet(parameters, layout).files
+    files = prepare_print_sheet(parameters, layout).make().files
     svg, pdf = files["print/sheet.svg"], files["print/sheet.pdf"]
     assert isinstance(svg, str) and isinstance(pdf, bytes)
     if renderer == "svg":
@@ -414,11 +415,11 @@ def test_crop_marks_continue_the_sides(renderer: str, values: dict[str, str]) ->
 
 def test_as_many_pads_as_fit() -> None:
     parameters = design(**{"sheet.pads": "3"})
-    assert make_print_sheet(parameters, build_layout(parameters)).figures["pads"] == 3
+    assert prepare_print_sheet(parameters, build_layout(parameters)).make().figures["pads"] == 3
     for values, message in (({"sheet.pads": "4000"}, "only"), ({"layers": "90"}, "does not fit into")):
         parameters = design(**values)
         with pytest.raises(DesignError, match=message):
-            make_print_sheet(parameters, build_layout(parameters))
+            prepare_print_sheet(parameters, build_layout(parameters)).make()
 
 
 @pytest.mark.parametrize(
@@ -435,7 +436,7 @@ def test_a_sheet_says_where_it_is_printed_and_is_mirrored_there(
 ) -> None:
     def sheet(**values: str) -> str:
         design = load("honeycomb", {"layers": "2", "sheet.pads": "1", **values})
-        content = make_print_sheet(design, build_layout(design)).files["print/sheet.svg"]
+        content = prepare_print_sheet(design, build_layout(design)).make().files["print/sheet.svg"]
         assert isinstance(content, str)
         return content
 

@@ -9,7 +9,7 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
 from cmpdesign.products.laser.coupon.design import design_coupon
 from cmpdesign.products.laser.setup import complete_setup
-from cmpdesign.products.sheet.print_sheet import make_print_sheet
+from cmpdesign.products.sheet.print_sheet import prepare_print_sheet
 from cmpdesign.scene import Camera, Optics, Scene, Sensor
 from extractor import Extractor, parse_layout
 from extractor.draw import draw_markers
@@ -69,7 +69,7 @@ def _sheet(page: str, name: str) -> bytes:
     import resvg_py
 
     design = page_design(page, name)
-    svg = make_print_sheet(design, build_layout(design)).files["print/sheet.svg"]
+    svg = prepare_print_sheet(design, build_layout(design)).make().files["print/sheet.svg"]
     png = resvg_py.svg_to_bytes(svg_string=str(svg), dpi=100, skip_system_fonts=True)
     raster = cv2.imdecode(np.frombuffer(bytes(png), np.uint8), cv2.IMREAD_COLOR)
     small = resized(np.asarray(raster, np.uint8), (240, 339))
