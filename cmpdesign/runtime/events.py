@@ -10,6 +10,7 @@ from enum import StrEnum
 from threading import Lock
 
 LOGGER = logging.getLogger("cmpdesign.runtime")
+LOGGER.addHandler(logging.NullHandler())  # a program decides what it shows
 MOST_EVENTS = 1000  # that are kept; chosen
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -44,8 +44,17 @@ class Health:
     advice: tuple[str, ...]
 
 
+class Timing(NamedTuple):
+    """Number, time and latency of a result."""
+
+    index: int
+    taken_s: float
+    latency_ms: float
+
+
 def health_of(
-    frames: Sequence[SensorFrame],
+    newest: SensorFrame,
+    timings: Sequence[Timing],
     rest: Sequence[Markers] | None,
     markers: int,
     limits: LimitsTable,
@@ -54,20 +63,21 @@ def health_of(
     """The health by the last results.
 
     Args:
-        frames: the last results, the newest last; at least one.
+        newest: the newest result.
+        timings: of the last results, the newest last.
         rest: the markers of each view at rest; None: not known.
         markers: number of markers of the pattern.
+        limits: what is accepted.
+        events: their number.
     """
-    newest = frames[-1]
-    taken_s, index = (np.array([getattr(one, name) for one in frames]) for name in ("taken_s", "index"))
-    latency = np.array([one.latency_ms for one in frames])
+    index, taken_s, latency = (np.array(column) for column in zip(*timings, strict=True))
     steps_ms = 1e3 * np.diff(taken_s)[np.diff(index) == 1]
     span_s, count = taken_s[-1] - taken_s[0], index[-1] - index[0]
     measured = [int((view.markers.status == 1).sum()) for view in newest.views]
     share = min(measured, default=0) / max(markers, 1)
     moved = [view.markers.xy_px - one.xy_px for view, one in zip(newest.views, rest or (), strict=False)]
     errors = [float(np.sqrt(np.nanmean(each**2))) for each in moved if np.isfinite(each).any()]
-    dropped = 1 - (len(frames) - 1) / count if count else 0.0
+    dropped = 1 - (len(timings) - 1) / count if count else 0.0
     qualities = tuple(view.markers.quality for view in newest.views)
     advice = [hint for quality in qualities if quality is not None for hint in quality.hints]
     if newest.reason:
@@ -81,7 +91,7 @@ def health_of(
             f"{dropped:.0%} of the frames have no result; ask for fewer frames a second, or fewer outputs"
         )
     return Health(
-        frames_per_s=(len(frames) - 1) / span_s if span_s > 0 else float("nan"),
+        frames_per_s=(len(timings) - 1) / span_s if span_s > 0 else float("nan"),
         jitter_ms=float(np.std(steps_ms)) if len(steps_ms) > 1 else float("nan"),
         latency_ms=(float(np.median(latency)), float(np.percentile(latency, 99)), float(latency.max())),
         dropped=float(dropped),

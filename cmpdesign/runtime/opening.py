@@ -100,7 +100,8 @@ def open_sensor(*paths: str | Path, outputs: Iterable[str] | None = None) -> Sen
 
     Args:
         paths: sensor files with a [camera]; the name of each without its ending is the sensor's.
-        outputs: of "markers", "shape" and "contact"; what is not wanted is not computed. None: all that a file allows.
+        outputs: of "markers", "virtual", "shape" and "contact"; what is not wanted is not computed. None: all that a
+            file allows, without virtual markers.
 
     Raises:
         SensorError: a file that cannot be used, two sensors of one name or on one camera.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from cmpdesign.inputs.cameras import CameraSettings
 from cmpdesign.inputs.files import path_exists
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from extractor import ContactTracker, Markers, Reference, ShapeTracker, Tracker, ViewExtractor
     from extractor.contact import ContactReader
 
-Output = Literal["markers", "shape", "contact"]
-OUTPUTS: tuple[Output, ...] = ("markers", "shape", "contact")
+OUTPUTS = ("markers", "virtual", "shape", "contact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,7 @@ class SensorPlan:
     Attributes:
         name: of the sensor: its file's name without the ending.
         file: the sensor file.
-        layout: the pad.
+        layout: the pad; without virtual markers, if these are not wanted.
         contact: reads forces; None: not wanted.
         has_shape: the surface is wanted.
         cameras: one for all views, or one for each.
@@ -106,7 +105,7 @@ def plan_of(file: SensorFile, outputs: Iterable[str] | None) -> SensorPlan:
 
     Args:
         file: names camera, layout, and for forces the gel.
-        outputs: of ``OUTPUTS``; None: all that the file allows.
+        outputs: of ``OUTPUTS``; None: all that the file allows, without virtual markers.
 
     Raises:
         SensorError: the file lacks what an output needs, or there is no such output.
@@ -132,6 +131,8 @@ def plan_of(file: SensorFile, outputs: Iterable[str] | None) -> SensorPlan:
             f'{file.path}: [camera] names no source; give the camera\'s number or name: source = "0"'
         )
     layout = load_layout(file.layout)
+    if "virtual" not in wanted:
+        layout = replace(layout, virtual_per_edge=0)
     has_shape = "shape" in wanted or (gel is not None and views > 1)
     return SensorPlan(
         file.path.stem,
@@ -145,7 +146,7 @@ def plan_of(file: SensorFile, outputs: Iterable[str] | None) -> SensorPlan:
 
 def _allowed(file: SensorFile) -> list[str]:
     has = {"markers": True, "shape": len(file.rig.views) > 1, "contact": file.gel is not None}
-    return [name for name in OUTPUTS if has[name]]
+    return [name for name, is_possible in has.items() if is_possible]
 
 
 def _cameras(file: SensorFile, views: int) -> tuple[CameraPlan, ...]:

@@ -11,7 +11,7 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.runtime.camera import Camera, CameraFrame
 from cmpdesign.runtime.events import Event as SensorEvent
 from cmpdesign.runtime.events import EventLog
-from cmpdesign.runtime.health import FRAMES, Health, health_of
+from cmpdesign.runtime.health import FRAMES, Health, Timing, health_of
 from cmpdesign.runtime.pairing import newest_set
 from cmpdesign.runtime.plan import SensorPlan
 from cmpdesign.runtime.result import SensorFrame
@@ -21,6 +21,7 @@ from cmpdesign.runtime.zero import rest_markers
 if TYPE_CHECKING:
     from extractor import ContactTracker, Markers, ShapeTracker, Tracker
 
+KEPT_RESULTS = 16  # of which those of several sensors are paired; chosen, as each holds its image
 LONGEST_WAIT_S = 0.25  # of the reading thread, before it looks for the end
 CLOSE_S = 5.0  # for the frame that is read at the end
 ZERO_WAIT_S = 3.0  # for the frames of a rest frame
@@ -42,12 +43,14 @@ class Sensor:
     Attributes:
         name: of the sensor.
         plan: as given.
+        count: number of results so far.
     """
 
     def __init__(self, plan: SensorPlan) -> None:
-        self.name, self.plan = plan.name, plan
+        self.name, self.plan, self.count = plan.name, plan, 0
         self._log, self._changed = EventLog(), Condition()
-        self._results: deque[SensorFrame] = deque(maxlen=FRAMES)
+        self._results: deque[SensorFrame] = deque(maxlen=KEPT_RESULTS)
+        self._timings: deque[Timing] = deque(maxlen=FRAMES)
         self._tracker: Tracker | ContactTracker | ShapeTracker | None = None
         self._rest: tuple[Markers, ...] | None = None
         self._closing, self._failure = Event(), ""
@@ -82,7 +85,9 @@ class Sensor:
         if not self._results:
             raise LateError(self._late_text("there is no result"))
         markers, limits = int(self.plan.layout.present.sum()), self.plan.file.table.limits
-        return health_of(self.results, self._rest, markers, limits, self._log.count)
+        return health_of(
+            self._results[-1], tuple(self._timings), self._rest, markers, limits, self._log.count
+        )
 
     def latest(self) -> SensorFrame:
         """The newest result. The first one is waited for.
@@ -163,6 +168,8 @@ class Sensor:
                 dropped_before, events = last, events + len(result.events)
                 with self._changed:
                     self._results.append(result)
+                    self.count += 1
+                    self._timings.append(Timing(result.index, result.taken_s, result.latency_ms))
                     self._changed.notify_all()
         except Exception as error:  # a fault of the reader must reach those who wait
             self._failure = f"the reader failed: {type(error).__name__}: {' '.join(str(error).split())}"
