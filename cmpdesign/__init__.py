@@ -75,7 +75,14 @@ if TYPE_CHECKING:
     from cmpdesign.layout.checks import check_design as check_design
     from cmpdesign.products.drawing.svg import write_svg as write_svg
     from cmpdesign.proposal.camera_design import size as size
+    from cmpdesign.runtime.health import Health as Health
+    from cmpdesign.runtime.opening import Sensors as Sensors
     from cmpdesign.runtime.opening import open_sensor as open_sensor
+    from cmpdesign.runtime.result import SensorFrame as SensorFrame
+    from cmpdesign.runtime.result import SensorFrames as SensorFrames
+    from cmpdesign.runtime.sensor import LateError as LateError
+    from cmpdesign.runtime.sensor import Sensor as Sensor
+    from cmpdesign.runtime.zero import TouchedError as TouchedError
     from cmpdesign.tracking.jobs.options import SequenceOptions as SequenceOptions
     from cmpdesign.tracking.jobs.options import ShapeOptions as ShapeOptions
     from cmpdesign.tracking.jobs.options import TrackOptions as TrackOptions
@@ -87,11 +94,18 @@ _HOMES = {
     "CmpDesignError": "cmpdesign.errors",
     "Design": "cmpdesign.api.designs",
     "DesignError": "cmpdesign.errors",
+    "Health": "cmpdesign.runtime.health",
     "InputError": "cmpdesign.errors",
+    "LateError": "cmpdesign.runtime.sensor",
     "Layout": "cmpdesign.api.layouts",
     "OutputError": "cmpdesign.errors",
+    "Sensor": "cmpdesign.runtime.sensor",
+    "SensorFrame": "cmpdesign.runtime.result",
+    "SensorFrames": "cmpdesign.runtime.result",
+    "Sensors": "cmpdesign.runtime.opening",
     "SequenceOptions": "cmpdesign.tracking.jobs.options",
     "ShapeOptions": "cmpdesign.tracking.jobs.options",
+    "TouchedError": "cmpdesign.runtime.zero",
     "TrackOptions": "cmpdesign.tracking.jobs.options",
     "Verifier": "cmpdesign.api.pictures",
     "build_layout": "cmpdesign.api.layouts",

@@ -125,7 +125,8 @@ def _latency(folder: Path, images: list[Any], rate_hz: float, seconds: float) ->
     return Latency(
         rate_hz,
         len(index),
-        *(float(np.percentile(latency_ms, share)) for share in (50, 99)),
+        float(np.percentile(latency_ms, 50)),
+        float(np.percentile(latency_ms, 99)),
         float(latency_ms.max()),
         1 - (len(index) - 1) / float(index[-1] - index[0]),
         unreported,
@@ -155,10 +156,10 @@ def _print(latencies: list[Latency], throughputs: list[Throughput]) -> None:
     for each in throughputs:
         table.add_row(f"{each.sensors}", f"{each.results_per_s:.0f}", f"{each.cores:.2f}")
     console.print(table)
-    one, two = throughputs
+    alone, both = throughputs
     console.print(
-        f"two sensors give {two.results_per_s / one.results_per_s:.2f} times the results of one, and use "
-        f"{two.cores - one.cores:.0%} of a second core"
+        f"two sensors give {both.results_per_s / alone.results_per_s:.2f} times the results of one, and use "
+        f"{both.cores - alone.cores:.0%} of a second core"
     )
 
 

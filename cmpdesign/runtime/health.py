@@ -47,7 +47,7 @@ class Health:
 class Timing(NamedTuple):
     """Number, time and latency of a result."""
 
-    index: int
+    number: int
     taken_s: float
     latency_ms: float
 

@@ -64,6 +64,10 @@ def plug(monkeypatch: pytest.MonkeyPatch) -> Plug:
     return in_place
 
 
+def opened(*paths: Path) -> Any:
+    return cmpdesign.open_sensor(*paths)
+
+
 def after(sensor: Any, kind: EventKind, within_s: float = 3.0) -> Any:
     """The first event of a kind, waited for."""
     end_s = time.monotonic() + within_s
@@ -76,7 +80,7 @@ def after(sensor: Any, kind: EventKind, within_s: float = 3.0) -> Any:
 
 def test_the_newest_frame_with_its_time(folder: Path, plug: Plug, shots: list[Any]) -> None:
     (camera,) = plug(TimedCamera([one.image for one in shots], FPS)).values()
-    with cmpdesign.open_sensor(folder / "thumb.toml") as sensors:
+    with opened(folder / "thumb.toml") as sensors:
         frame = sensors.thumb.wait()
         for _ in range(5):
             last, frame = frame, sensors.thumb.wait(after=frame.index, timeout_s=1.0)
@@ -103,7 +107,7 @@ def test_dropped_frames_are_counted(folder: Path, plug: Plug, shots: list[Any]) 
     text = (folder / "thumb.toml").read_text().replace("fps = 20.0", f"fps = {fast}")
     (folder / "thumb.toml").write_text(text)
     plug(TimedCamera([one.image for one in shots], fast))
-    with cmpdesign.open_sensor(folder / "thumb.toml") as sensors:
+    with opened(folder / "thumb.toml") as sensors:
         time.sleep(0.5)
     frames = sensors.thumb.results
     assert sum(one.dropped for one in frames) > 10
@@ -124,7 +128,7 @@ def test_a_gap_is_reported_within_two_frames_and_ends(
         (folder / "thumb.toml").read_text().replace("fps = 20.0", "fps = 10.0")
     )
     caplog.set_level(logging.INFO, "cmpdesign.runtime")
-    with cmpdesign.open_sensor(folder / "thumb.toml") as sensors:
+    with opened(folder / "thumb.toml") as sensors:
         first = after(sensors.thumb, EventKind.SILENT if kind == "stall" else EventKind.STOPPED)
         noticed_s = first.unix_s - time.time() + time.monotonic() - camera.began_s
         assert noticed_s - int(begin_s * fps) / fps < 2 / fps + 0.15  # for the machine
@@ -148,7 +152,7 @@ def test_nothing_hangs_on_close(folder: Path, plug: Plug, shots: list[Any]) -> N
     before = threading.active_count()
     for faults in ((), (Fault("stall", 0.2, 2.0),), (Fault("unplugged", 0.2, 99.0),)):
         plug(TimedCamera([one.image for one in shots], FPS, faults))
-        with cmpdesign.open_sensor(folder / "thumb.toml") as sensors:
+        with opened(folder / "thumb.toml") as sensors:
             time.sleep(0.35)
             began_s = time.monotonic()
         assert time.monotonic() - began_s < 1.0
@@ -164,7 +168,7 @@ def test_two_sensors_are_paired_by_time(folder: Path, plug: Plug, shots: list[An
     images = [one.image for one in shots]
     began_s = time.monotonic()
     plug(TimedCamera(images, FPS, began_s=began_s), TimedCamera(images, FPS, began_s=began_s + 0.01))
-    with cmpdesign.open_sensor(folder / "thumb.toml", folder / "index.toml") as sensors:
+    with opened(folder / "thumb.toml", folder / "index.toml") as sensors:
         assert [one.name for one in sensors] == ["thumb", "index"]
         frames = sensors.wait()
         for _ in range(4):
@@ -179,7 +183,7 @@ def test_zero_takes_the_mean_at_rest_and_refuses_a_touched_pattern(folder: Path,
     pressed = [shot(surface=Press(4.0, 0.25), seed=seed).image for seed in range(4)]
     shown = noisy
     plug(TimedCamera(lambda number: shown[number % len(shown)], 60.0))
-    with cmpdesign.open_sensor(folder / "thumb.toml") as sensors:
+    with opened(folder / "thumb.toml") as sensors:
         sensors.thumb.wait()
         first = sensors.thumb.results[0]
         assert not np.nan_to_num(first.tracked.displacement_px).any()  # the first frame is at rest
@@ -210,7 +214,7 @@ def test_a_surface_of_recorded_views(tmp_path: Path) -> None:
     write_press(tmp_path)
     camera = 'layout = "layout.json"\ncamera.source = "frames"\n'
     (tmp_path / "hand.toml").write_text(camera + (tmp_path / "rig.toml").read_text())
-    with cmpdesign.open_sensor(tmp_path / "hand.toml") as sensors:
+    with opened(tmp_path / "hand.toml") as sensors:
         ended = after(sensors.hand, EventKind.ENDED)
         last = sensors.hand.wait(after=2)
         with pytest.raises(LateError, match="the recorded frames are over"):
