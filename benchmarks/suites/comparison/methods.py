@@ -16,7 +16,7 @@ from benchmarks.suites.article.corners import fit_plain_triangles
 from benchmarks.suites.article.graph import connect_corners
 from benchmarks.suites.article.numbering import make_lattice_tables, number_triangles
 from benchmarks.suites.article.regions import grow_from_hues
-from benchmarks.support.scenes import (
+from benchmarks.suites.scenes import (
     BOARD_LAYERS,
     SceneCase,
     cached_extractor,
