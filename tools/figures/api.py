@@ -19,6 +19,7 @@ ROOMS = {
         "files, workshop and experiments": "layout files products workshop",
         "pictures": "pictures plots",
         "sequences": "sequences tracking inputs",
+        "sensors of a robot": "runtime",
         "calibration and force": "calibration force",
         "data sets": "datasets",
         "errors": "errors",

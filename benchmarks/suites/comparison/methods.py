@@ -35,7 +35,7 @@ HALF_WINDOW_PX = (
 )
 SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
 REFERENCE_METHOD = "OpenCV findChessboardCornersSB"
-MEASURING_STAGES = ("refine", "repair", "virtual")  # the stages after the 7th
+MEASURING_STAGES = ("refine", "repair")  # the stages after the 7th
 
 
 @dataclass(frozen=True, eq=False)
