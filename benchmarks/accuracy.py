@@ -1,33 +1,24 @@
 """Error against the exact bound, bias and calibration: patterns and surfaces, and sweeps over blur, noise and pitch.
 
-    python -m benchmarks.accuracy [--quick] [--json FILE] [--publish]
-
 Standard scene (640 x 480 px, 11 layers, edges of 20 px, turned by 7.3 degrees, blur 1 px, sRGB, noise 2/255) unless a
 row states another value; inks, blur and noise are not given to the extractor. Errors are RMS per axis; the bound is the
 exact Cramer-Rao bound of the same sRGB picture and markers. "inner" are the markers with all their gridlines. z is the
-RMS
-error over the stated covariance per axis: 1 is right. The calibration of all markers and virtual markers follows each
-table.
+RMS error over the stated covariance per axis: 1 is right. The calibration of all markers and virtual markers follows
+each table.
 """
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-if __name__ == "__main__":  # before numpy: times are of one core
-    os.environ["OMP_NUM_THREADS"] = "1"
-
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
-from benchmarks.frame.conditions import conditions_text
+from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.published import Page
+from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.scenes import (
     SCENE_KINDS,
     WRONG_SHARE,
@@ -43,7 +34,6 @@ from benchmarks.suites.scoring.squares import (
     calibrations_by_position,
     picture_squares,
 )
-from benchmarks.support.command import publishing_parser, wide_console, write_json, write_published
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
 from extractor.presets import PRESETS, Preset
@@ -59,10 +49,10 @@ GROUPS: dict[str, tuple[SceneCase, ...]] = {
     "noise": tuple(SceneCase(noise=noise) for noise in (0.5, 1.0, 2.0, 4.0, 8.0, 12.0)),
     "pitch": tuple(SceneCase(pitch_px=pitch, layers=layers) for pitch, layers in PITCHES),
 }
-COLUMNS = (
-    "case", "preset", "found", "wrong", "inner px", "/ bound", "all px", "/ bound", "bias px", "inner z",
-    "refine ms",
-)  # fmt: skip
+COLUMNS = {
+    "case": TEXT, "preset": TEXT, "found": ".1%", "wrong": "d", "inner px": ".4f", "inner / bound": ".2f",
+    "all px": ".4f", "all / bound": ".2f", "bias px": ".4f", "inner z": ".2f", "refine ms": ".1f",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -137,16 +127,14 @@ def rms(errors: NDArray[np.float64]) -> float:
 
 
 def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
-    shown = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
-    for number, column in enumerate(COLUMNS):
-        shown.add_column(column, justify="right" if number > 1 else "left", no_wrap=True)
-    for r in results:
-        shown.add_row(
-            r.case, r.preset, f"{r.found_share:.1%}", str(r.wrong), f"{r.inner_px:.4f}",
-            f"{r.inner_px / r.inner_bound_px:.2f}", f"{r.all_px:.4f}", f"{r.all_px / r.all_bound_px:.2f}",
-            f"{r.bias_px:.4f}", f"{r.z:.2f}", f"{r.refine_ms:.1f}",
-        )  # fmt: skip
-    return shown
+    rows = [
+        (
+            r.case, r.preset, r.found_share, r.wrong, r.inner_px, r.inner_px / r.inner_bound_px, r.all_px,
+            r.all_px / r.all_bound_px, r.bias_px, r.z, r.refine_ms,
+        )
+        for r in results
+    ]  # fmt: skip
+    return Table(title, COLUMNS, rows)
 
 
 def squares_by_preset(measured: Sequence[MeasuredCase]) -> dict[str, list[PictureSquares]]:
@@ -155,16 +143,6 @@ def squares_by_preset(measured: Sequence[MeasuredCase]) -> dict[str, list[Pictur
         preset: [squares for case in measured if case.result.preset == preset for squares in case.squares]
         for preset in PRESETS
     }
-
-
-def calibration_text(squares: Mapping[str, Sequence[PictureSquares]]) -> str:
-    """The calibration of all markers and virtual markers, one line per preset and status."""
-    found = {
-        f"{preset}: {position}": stated
-        for preset, pictures in squares.items()
-        for position, stated in calibrations_by_position(pictures).items()
-    }
-    return f"{calibration_table('', found)}\n"
 
 
 def markdown(results: Sequence[AccuracyResult]) -> str:
@@ -183,44 +161,41 @@ def markdown(results: Sequence[AccuracyResult]) -> str:
     return "\n".join(lines)
 
 
-def documentation_blocks(results: Sequence[AccuracyResult]) -> dict[str, str]:
-    """The tables of docs/explanation/accuracy.md, by block."""
-    return {f"accuracy-{group}": markdown([r for r in results if r.group == group]) for group in GROUPS}
+def page(measured: Mapping[str, Any]) -> Page:
+    """The tables of docs/explanation/accuracy.md from the content of docs/measured/accuracy.json."""
+    results = [AccuracyResult(**row) for row in measured["results"]]
+    return Page({f"accuracy-{group}": markdown([r for r in results if r.group == group]) for group in GROUPS})
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Measure, print a table a group; write the JSON file or the documentation if asked."""
-    options = publishing_parser("accuracy", __doc__, "noises").parse_args(arguments)
-    cv2.setNumThreads(1)
-    seeds = QUICK_SEEDS if options.quick else SEEDS
-    console = wide_console(130)
+def measure(quick: bool = False) -> Shown:
+    """Two tables for every group of cases.
+
+    Args:
+        quick: few noises.
+    """
+    seeds = QUICK_SEEDS if quick else SEEDS
     results: list[AccuracyResult] = []
     calibrations: dict[str, Any] = {}
     for group, cases in GROUPS.items():
         of_group = [measured for case in cases for measured in measure_case(group, case, seeds)]
-        results += [measured.result for measured in of_group]
-        console.print(
-            results_table(
-                f"{group}; sRGB pictures, {seeds} noises", [measured.result for measured in of_group]
-            )
-        )
-        squares = squares_by_preset(of_group)
-        console.print(calibration_text(squares), highlight=False, soft_wrap=True)
-        calibrations[group] = {
-            preset: {name: asdict(found) for name, found in calibrations_by_position(pictures).items()}
-            for preset, pictures in squares.items()
+        own = [measured.result for measured in of_group]
+        results += own
+        yield results_table(f"{group}; sRGB pictures, {seeds} noises", own)
+        stated = {
+            preset: calibrations_by_position(pictures)
+            for preset, pictures in squares_by_preset(of_group).items()
         }
-    console.print(conditions_text(), style="dim", soft_wrap=True)
-    found: dict[str, Any] = {
-        "seeds": seeds, "results": [asdict(result) for result in results], "calibration": calibrations,
-    }  # fmt: skip
-    if options.json:
-        write_json(options.json, found)
-    if options.publish:
-        for path in write_published("accuracy", found, documentation_blocks(results)):
-            console.print(f"wrote {path}")
-    return 0
+        named = {
+            f"{preset}: {name}": one for preset, by_name in stated.items() for name, one in by_name.items()
+        }
+        yield calibration_table(f"{group}, calibration", named)
+        calibrations[group] = {
+            preset: {name: asdict(one) for name, one in by_name.items()} for preset, by_name in stated.items()
+        }
+    return Found({"seeds": seeds, "results": [asdict(one) for one in results], "calibration": calibrations})
 
+
+main = Experiment("accuracy", measure, page)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -6,15 +6,12 @@ A row is a rule that was ever tried, on the pictures of one seed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
-from benchmarks.frame.published import read_measured
+from benchmarks.frame.published import Page
 from benchmarks.suites.ablation.comparison import Comparison
 from benchmarks.suites.ablation.rules import BY_NAME
-from benchmarks.support.command import write_published
 
-NAME = "ablation"
 JUDGED = ("wrong", "lost", "rms_px", "typical_px", "departure", "beyond", "ms")
 
 
@@ -25,12 +22,10 @@ def comparison_row(found: Comparison) -> dict[str, Any]:
     return {**found._asdict(), **changes, **named, "verdict": found.verdict}
 
 
-def publish(rows: Iterable[Mapping[str, Any]], command: str, seed: int) -> list[Path]:
-    """Put the rows beside those of the rules that were tried earlier. Returns the written files."""
-    earlier = read_measured(NAME).get("rows", [])
-    own = [{**row, "command": command, "seed": seed} for row in rows]
-    measured = {"rows": merged_rows(earlier, own)}
-    return write_published(NAME, measured, documentation_blocks(measured))
+def merged(earlier: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """The rows of a run beside those of the rules that were tried earlier."""
+    own = [{**row, "command": new["command"], "seed": new["seed"]} for row in new["rows"]]
+    return {"conditions": new["conditions"], "rows": merged_rows(earlier.get("rows", []), own)}
 
 
 def merged_rows(
@@ -48,7 +43,7 @@ def merged_rows(
     return [row for of_rule in by_rule.values() for row in of_rule.values()]
 
 
-def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
+def page(measured: Mapping[str, Any]) -> Page:
     """The tables of docs/explanation/rules.md from the content of docs/measured/ablation.json."""
     rows = measured["rows"]
     lines = [
@@ -70,7 +65,7 @@ def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
     ]
     commands = dict.fromkeys(row["command"] for row in rows)
     written = ["Written by", *(f"`{command}`" for command in commands)]
-    return {NAME: "\n".join([*lines, "", *more, "", "\n".join(written)])}
+    return Page({"ablation": "\n".join([*lines, "", *more, "", "\n".join(written)])})
 
 
 def _line(row: Mapping[str, Any]) -> str:

@@ -6,49 +6,26 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-
 from benchmarks.acceptance.points import MOST_LOST, MOST_WRONG, Point
-from benchmarks.frame.published import read_measured
+from benchmarks.frame.published import Page
+from benchmarks.frame.table import TEXT, Table
 
-NAME, IMAGE = "acceptance", "acceptance.png"
+IMAGE = "acceptance.png"
 BLUE, GREY = "#0072b2", "#444444"
 
 
 def curve_table(points: Sequence[Point], own: Point) -> Table:
     """A row for each threshold."""
-    table = Table(
-        title="Wrong positions against lost markers",
-        box=SIMPLE_HEAD,
-        title_justify="left",
-        pad_edge=False,
-    )
-    for name in (
-        "threshold",
-        "reported",
-        "wrong ids",
-        "wrong",
-        "per million",
-        "95 % below",
-        "lost",
-        "of today's",
-    ):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    for one in points:
-        table.add_row(
-            f"{one.threshold:g}",
-            f"{one.reported:,}",
-            str(one.wrong_ids),
-            str(one.wrong_positions),
-            f"{one.wrong_per_million:.1f}",
-            f"{one.upper_per_million:.1f}",
-            f"{one.lost:,}",
-            f"{one.lost / own.lost:.3f}",
-            "holds" if one.holds(own) else "",
+    columns = {"threshold": "g", "reported": ",", "wrong ids": "d", "wrong": "d", "per million": ".1f"}
+    columns |= {"95 % below": ".1f", "lost": ",", "of today's": ".3f", "": TEXT}
+    rows = [
+        (
+            one.threshold, one.reported, one.wrong_ids, one.wrong_positions, one.wrong_per_million,
+            one.upper_per_million, one.lost, one.lost / own.lost, "holds" if one.holds(own) else "",
         )
-    return table
+        for one in points
+    ]  # fmt: skip
+    return Table("wrong positions against lost markers", columns, rows)
 
 
 def own_point(measured: Mapping[str, Any]) -> Point:
@@ -61,8 +38,8 @@ def measured_points(measured: Mapping[str, Any]) -> list[Point]:
     return [Point(**entry) for entry in measured["points"]]
 
 
-def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
-    """The part of the documentation from the content of docs/measured/acceptance.json."""
+def page(measured: Mapping[str, Any]) -> Page:
+    """The block and the picture from the content of docs/measured/acceptance.json."""
     points, own = measured_points(measured), own_point(measured)
     rows = [
         f"![Wrong positions against lost markers](../images/{IMAGE})",
@@ -77,12 +54,7 @@ def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
         for one in points
     ]
     rows += ["", f"Written by `{measured['command']}`: {measured['pictures']:,} pictures."]
-    return {NAME: "\n".join(rows)}
-
-
-def figures() -> dict[str, bytes]:
-    """Name in docs/images -> PNG, from docs/measured/acceptance.json."""
-    return {IMAGE: curve_picture(read_measured(NAME))}
+    return Page({"acceptance": "\n".join(rows)}, {IMAGE: curve_picture(measured)})
 
 
 def curve_picture(measured: Mapping[str, Any]) -> bytes:

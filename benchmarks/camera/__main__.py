@@ -39,7 +39,7 @@ def measure(
     return Found(record, any(result.wrong_ids or result.raised for result in results))
 
 
-main = Experiment("camera", measure, page)
+main = Experiment("camera", measure, page, published_options=("pictures", "seed", "preset"))
 
 if __name__ == "__main__":
     raise SystemExit(main())

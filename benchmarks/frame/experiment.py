@@ -67,12 +67,14 @@ class Experiment:
         measure: see the module.
         page: for experiments that the documentation shows: content of docs/measured -> blocks and pictures.
         merged: earlier content of docs/measured, record -> the record to publish; the new record alone by default.
+        published_options: those that a published run may change; all others have their defaults.
     """
 
     name: str
     measure: Callable[..., Shown]
     page: Callable[[dict[str, Any]], Page] | None = None
     merged: Callable[[dict[str, Any], Mapping[str, Any]], Mapping[str, Any]] = lambda earlier, new: new
+    published_options: tuple[str, ...] = ()
 
     def published(self) -> Page:
         """What the documentation shows by the present content of docs/measured."""
@@ -84,8 +86,10 @@ class Experiment:
         parser = self._parser()
         options = vars(parser.parse_args(arguments))
         json_path, is_published = options.pop("json"), options.pop("publish", False)
-        if is_published and options.get("quick"):
-            parser.error("figures of --quick are not published; leave one of the two out")
+        usual = {name: parser.get_default(name) for name in options}
+        for name in options if is_published else ():
+            if options[name] != usual[name] and name not in (*self.published_options, "processes"):
+                parser.error(f"figures with --{name} are not published; leave --publish or --{name} out")
         try:
             self._check(options)
             return self._run(options, json_path, is_published)
@@ -110,7 +114,7 @@ class Experiment:
             write_file(json_path, json_text({**known, "tables": tables, **found.record}))
         if is_published:
             assert self.page is not None
-            record = {**known, **self.merged(read_measured(self.name), found.record)}
+            record = dict(self.merged(read_measured(self.name), {**known, **found.record}))
             for path in publish(self.name, record, self.page(record)):
                 print(f"wrote {path}")
         return int(found.failed)
@@ -132,9 +136,9 @@ class Experiment:
         words = [f"python -m benchmarks.{self.name}"]
         for name, parameter in signature(self.measure).parameters.items():
             value, option = options[name], f"--{name.replace('_', '-')}"
+            values = value if isinstance(value, list) else [value]
             if value in (parameter.default, None) or name == "processes":
                 continue
-            values = value if isinstance(value, tuple | list) else [value]
             words += [option if value is True else f"{option} {_quoted(each)}" for each in values]
         return " ".join(words)
 
@@ -177,7 +181,7 @@ def _add_option(parser: argparse.ArgumentParser, parameter: Parameter, kind: Any
     if get_origin(kind) is UnionType:
         (kind,) = (each for each in get_args(kind) if each is not NoneType)
     if get_origin(kind) is tuple:
-        kind, option["nargs"] = get_args(kind)[0], "+"
+        kind, option["nargs"], option["action"], option["default"] = get_args(kind)[0], "+", "extend", []
     if kind is bool:
         option["action"] = "store_true"
     elif get_origin(kind) is Literal:

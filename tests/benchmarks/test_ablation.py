@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.ablation.__main__ import comparison_line, main, try_rules
 from benchmarks.ablation.report import merged_rows
-from benchmarks.ablation.run import comparison_line, main, try_rules
 from benchmarks.suites.ablation.comparison import LEAST_LOSS, compare
 from benchmarks.suites.ablation.pictures import PatternTruth, keep_pictures, pattern_truth, sampled_cases
 from benchmarks.suites.ablation.provoking import CHANGES, FOREIGN, provoking_cases
@@ -239,7 +239,7 @@ def test_a_rules_row_replaces_that_of_the_same_seed_and_stands_beside_the_others
 def test_the_command_lists_its_rules_and_refuses_no_pictures(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--list"]) == 0
     listed = capsys.readouterr().out.splitlines()
-    assert len(listed) == len(RULES) and all(rule.purpose in listed[n] for n, rule in enumerate(RULES))
+    assert len(listed) == len(RULES) + 2 and all(rule.purpose in listed[n] for n, rule in enumerate(RULES))
     with pytest.raises(SystemExit):
         main(["--pictures", "0"])
     assert "it must be 1 or more" in capsys.readouterr().err

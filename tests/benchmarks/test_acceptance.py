@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.acceptance.__main__ import THRESHOLDS, curve, keep_all
 from benchmarks.acceptance.points import Point, upper_share
-from benchmarks.acceptance.run import THRESHOLDS, curve, keep_all
 
 
 def test_the_bound_of_nothing_wrong_is_three_over_the_count_and_rises_with_what_is_wrong() -> None:

@@ -14,9 +14,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from benchmarks.support.timed_camera import Fault, TimedCamera, in_the_place_of_opencv
 
 import cmpdesign
-from benchmarks.support.timed_camera import Fault, TimedCamera, in_the_place_of_opencv
 from cmpdesign.runtime.events import EventKind
 from cmpdesign.runtime.sensor import LateError
 from cmpdesign.runtime.zero import TouchedError

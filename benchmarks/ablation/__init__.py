@@ -1,1 +1,0 @@
-"""``python -m benchmarks.ablation``: the effect of each rule of the reader."""

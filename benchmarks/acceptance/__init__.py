@@ -1,1 +1,0 @@
-"""``python -m benchmarks.acceptance``: wrong positions against lost markers, over the threshold of acceptance."""
