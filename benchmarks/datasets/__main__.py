@@ -26,7 +26,7 @@ from cmpdesign.data import load
 from cmpdesign.data.run import ShardRange, extract_markers, make_dataset
 from cmpdesign.data.schedule.schedulers import Scheduler
 from cmpdesign.data.schedule.schedulers import results as results_of
-from cmpdesign.data.videos.extraction import Reading
+from cmpdesign.data.videos.extraction import FrameReading
 from cmpdesign.design.templates import find_plan
 from cmpdesign.files.images import to_png
 from cmpdesign.tracking.export.video import Codec, CodecVideo
@@ -154,7 +154,7 @@ def measure_extraction(folder: Path, shards: int) -> Rates:
     times, frames = [], 0
     for count in (1, 2):
         out = folder / f"markers{count}"
-        options = (Reading(), Scheduler(workers=count), 4 * FRAMES_A_SHARD)
+        options = (FrameReading(), Scheduler(workers=count), 4 * FRAMES_A_SHARD)
         times.append(spent(lambda: extract_markers(layout, videos, out, *options)))  # noqa: B023
         frames = len(load(out))
     return rates_of("extracted", frames, times[0], times[1])

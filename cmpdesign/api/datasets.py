@@ -88,14 +88,14 @@ def extract(
     from cmpdesign.data import load
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler
-    from cmpdesign.data.videos.extraction import Reading
+    from cmpdesign.data.videos.extraction import FrameReading
 
     texts = [sources] if isinstance(sources, str | Path) else sources
     extract_markers(
         reference_from(layout),
         [str(text) for text in texts],
         output,
-        Reading(**reading),
+        FrameReading(**reading),
         parse_scheduler(scheduler, workers),
         frames_a_shard,
     )

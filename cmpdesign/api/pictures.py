@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SIZE_PX = (640, 480)
 
 
-class View(TypedDict, total=False):
+class ViewOptions(TypedDict, total=False):
     """The properties of a plain picture; the names are the names in scene files.
 
     Keys:
@@ -53,7 +53,7 @@ class View(TypedDict, total=False):
     response: Literal["srgb", "linear"] | float
 
 
-_USUAL = View(
+_USUAL = ViewOptions(
     pitch_px=20.0,
     rotation_deg=0.0,
     tilt_deg=0.0,
@@ -67,24 +67,24 @@ _USUAL = View(
 )
 
 
-def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[View]) -> Scene:
+def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -> Scene:
     """A scene of a pattern under one camera, without a scene file.
 
     Args:
         layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
         seed: seed of the noise.
-        view: see ``View``.
+        view: see ``ViewOptions``.
 
     Raises:
         SceneError: a value out of range; the message names it.
-        TypeError: a name that ``View`` does not have.
+        TypeError: a name that ``ViewOptions`` does not have.
     """
     from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
 
     unknown = sorted(view.keys() - _USUAL.keys())
     if unknown:
         raise TypeError(f"{unknown[0]} is no property of a view; there are {', '.join(_USUAL)}")
-    pattern, chosen = layout_from(layout), View(**{**_USUAL, **view})
+    pattern, chosen = layout_from(layout), ViewOptions(**{**_USUAL, **view})
     radius_mm = chosen["press_radius_mm"]
     if radius_mm is None:
         radius_mm = min(pattern.size_mm) / 4
@@ -133,7 +133,7 @@ def render(
     *,
     size: tuple[int, int] | None = None,
     seed: int | None = None,
-    **view: Unpack[View],
+    **view: Unpack[ViewOptions],
 ) -> Rendered:
     """Draw a camera's picture of a pattern, with the exact truth, as the command ``render`` does.
 
@@ -146,7 +146,7 @@ def render(
         scene: a scene template's name or a TOML file; None: the plain picture that ``view`` describes.
         size: (width, height) in px; None: the scene's, or 640 x 480.
         seed: seed of all random parts; None: the scene's, or 0.
-        view: see ``View``; only without ``scene``, whose file has these values.
+        view: see ``ViewOptions``; only without ``scene``, whose file has these values.
 
     Raises:
         CmpDesignError: no such scene, or a value that cannot be rendered; a scene that is a sequence, which

@@ -21,7 +21,13 @@ from cmpdesign.data.folder import (
 from cmpdesign.data.frames.plan import prepare_plan
 from cmpdesign.data.schedule.schedulers import Scheduler, results
 from cmpdesign.data.shard import make_shard
-from cmpdesign.data.videos.extraction import Reading, SourceTask, index_source, name_tasks, prepare_extraction
+from cmpdesign.data.videos.extraction import (
+    FrameReading,
+    SourceTask,
+    index_source,
+    name_tasks,
+    prepare_extraction,
+)
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.libraries import require_libraries
 from cmpdesign.watch import tell
@@ -82,7 +88,7 @@ def extract_markers(
     layout: Reference,
     sources: Sequence[str],
     folder: str | Path,
-    reading: Reading,
+    reading: FrameReading,
     scheduler: Scheduler,
     frames_a_shard: int = FRAMES_A_SHARD,
 ) -> Progress:

@@ -6,10 +6,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from cmpdesign.documents.document import Document, Part
+from cmpdesign.documents.document import Document, DocumentPart
 
 
-class CalibrationPicturePart(Part):
+class CalibrationPicturePart(DocumentPart):
     """One picture of a calibration."""
 
     picture: str
@@ -43,7 +43,7 @@ class CalibrateCameraDocument(Document):
     pictures: tuple[CalibrationPicturePart, ...]
 
 
-class MirrorsPart(Part):
+class MirrorsPart(DocumentPart):
     """The mirrors of two views that share a camera."""
 
     views: tuple[str, str]

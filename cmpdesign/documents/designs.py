@@ -7,10 +7,10 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from cmpdesign.documents.document import Document, Part
+from cmpdesign.documents.document import Document, DocumentPart
 
 
-class FindingPart(Part):
+class FindingPart(DocumentPart):
     """One feature that cannot be made or read."""
 
     severity: Literal["error", "warning"] = Field(
@@ -23,7 +23,7 @@ class FindingPart(Part):
     remedy: str
 
 
-class PadReadingPart(Part):
+class PadReadingPart(DocumentPart):
     """The reading of the pad that a product makes; null where no marker was measured."""
 
     measured_share: float = Field(description="Measured markers over visible markers.")
@@ -83,7 +83,7 @@ class SizeDocument(Document):
     next_command: str = Field(description="The command that makes the design's files.")
 
 
-class TemplatePart(Part):
+class TemplatePart(DocumentPart):
     """One template."""
 
     kind: str

@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 
-class Part(BaseModel):
+class DocumentPart(BaseModel):
     """An object within a document. Unknown fields and values that are not finite are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -17,7 +17,7 @@ def _require_format(schema: dict[str, Any]) -> None:
     schema["required"] = ["format", "version", *schema.get("required", [])]
 
 
-class Document(Part):
+class Document(DocumentPart):
     """The document that a command prints with ``--json``.
 
     A document has the fields ``format`` and ``version``. The version rises when a field is removed or changes its

@@ -6,10 +6,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from cmpdesign.documents.document import Document, Part
+from cmpdesign.documents.document import Document, DocumentPart
 
 
-class QualityPart(Part):
+class QualityPart(DocumentPart):
     """Properties of a picture; null where unknown."""
 
     blur_px: float | None = Field(description="Sigma of the Gaussian that optics and pixel make together.")
@@ -26,7 +26,7 @@ class QualityPart(Part):
     hints: tuple[str, ...] = Field(description="Causes that limit the result, with remedies.")
 
 
-class SheetPart(Part):
+class SheetPart(DocumentPart):
     """Measurements of a picture of a print sheet."""
 
     name: str
@@ -43,7 +43,7 @@ class SheetPart(Part):
     note: str | None
 
 
-class ImagePart(Part):
+class ImagePart(DocumentPart):
     """The verdict on one picture. Fields that do not apply are not set: of unread pictures, or of print sheets."""
 
     image: str = Field(description="Path of the picture, or the name of a source and the number of a frame.")
@@ -81,7 +81,7 @@ class VerifyDocument(Document):
         return self.model_dump_json(indent=2, exclude_unset=True) + "\n"
 
 
-class PatchPart(Part):
+class PatchPart(DocumentPart):
     """The kerfs of one patch of a coupon; x of cuts along y, y of cuts along x."""
 
     name: str
@@ -112,7 +112,7 @@ class KerfDocument(Document):
     patches: tuple[PatchPart, ...]
 
 
-class GridFieldPart(Part):
+class GridFieldPart(DocumentPart):
     """One power and speed of a grid."""
 
     name: str

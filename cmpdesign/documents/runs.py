@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from cmpdesign.documents.document import Document, Part
+from cmpdesign.documents.document import Document, DocumentPart
 from cmpdesign.documents.reading import QualityPart
 
 
-class FramesPart(Part):
+class FramesPart(DocumentPart):
     """Numbers of frames."""
 
     declared: int | None = Field(description="Number of frames that the source states; null where unknown.")
@@ -21,7 +21,7 @@ class FramesPart(Part):
     other_size: int
 
 
-class SharesPart(Part):
+class SharesPart(DocumentPart):
     """Shares of markers by their status, over all frames."""
 
     measured: float
@@ -29,7 +29,7 @@ class SharesPart(Part):
     lost: float
 
 
-class RestPart(Part):
+class RestPart(DocumentPart):
     """The rest frame."""
 
     markers: int
@@ -37,7 +37,7 @@ class RestPart(Part):
     residual_mm: float | None
 
 
-class LargestPart(Part):
+class LargestPart(DocumentPart):
     """The largest displacement of a run."""
 
     px: float | None = None
@@ -46,7 +46,7 @@ class LargestPart(Part):
     marker: int
 
 
-class LivePart(Part):
+class LivePart(DocumentPart):
     """The counts of a live server."""
 
     address: str
@@ -58,7 +58,7 @@ class LivePart(Part):
     failure: str = Field(description="Why the server stopped before the end.")
 
 
-class TimesPart(Part):
+class TimesPart(DocumentPart):
     """How the times of the frames were found."""
 
     of: Literal["names", "numbers", "index", "table", "video", "camera", "arrival", "none"]
@@ -71,7 +71,7 @@ class TimesPart(Part):
     camera_clock_s: float | None = Field(description="The camera's own clock when time_s was 0.")
 
 
-class CameraPart(Part):
+class CameraPart(DocumentPart):
     """What a camera used, as its driver answered; null where it does not say."""
 
     camera_size: tuple[int, int] | None
@@ -86,7 +86,7 @@ class CameraPart(Part):
     backend: str = Field(description="OpenCV's name of the driver's interface.")
 
 
-class CameraFormatPart(Part):
+class CameraFormatPart(DocumentPart):
     """One size of one pixel format of a camera."""
 
     format: str = Field(description="Four letters.")
@@ -94,7 +94,7 @@ class CameraFormatPart(Part):
     fps: tuple[float, ...] = Field(description="Rates, or the smallest and the largest.")
 
 
-class CameraRangePart(Part):
+class CameraRangePart(DocumentPart):
     """The range of a setting of a camera."""
 
     name: Literal["exposure", "gain", "white balance", "focus"]
@@ -105,7 +105,7 @@ class CameraRangePart(Part):
     unit: str = Field(description="ms or K; empty: the camera's own.")
 
 
-class ListedCameraPart(Part):
+class ListedCameraPart(DocumentPart):
     """A camera of this machine."""
 
     number: int = Field(description="As track takes it.")
@@ -128,7 +128,7 @@ class CamerasDocument(Document):
     cameras: tuple[ListedCameraPart, ...]
 
 
-class PressPart(Part):
+class PressPart(DocumentPart):
     """The frame with the largest press."""
 
     frame: int
@@ -137,7 +137,7 @@ class PressPart(Part):
     regions: int
 
 
-class ContactPart(Part):
+class ContactPart(DocumentPart):
     """The contacts of a run."""
 
     reasons: dict[str, int] = Field(description="Reasons of contacts -> number of frames.")
@@ -176,7 +176,7 @@ class TrackDocument(Document):
     written: tuple[str, ...] = Field((), description="Files; not in the summary's file.")
 
 
-class ViewPart(Part):
+class ViewPart(DocumentPart):
     """One view of a rig."""
 
     name: str
@@ -184,7 +184,7 @@ class ViewPart(Part):
     rms_px: float = Field(description="RMS residual of the view's pose at rest.")
 
 
-class PositionsPart(Part):
+class PositionsPart(DocumentPart):
     """The surface to which the positions belong."""
 
     of: Literal["pattern"]

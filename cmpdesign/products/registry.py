@@ -2,7 +2,8 @@
 
 A product is added by one line in ``PRODUCTS``. The line names the product's maker as "module:function", so that
 the module is imported only when the product is made. A maker takes ``(design, layout)``, checks what can be checked
-before a file is drawn, and returns ``Prepared``: the pad that the product makes, and the product when it is asked for.
+before a file is drawn, and returns ``PreparedProduct``: the pad that the product makes, and the product when it is
+asked for.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class ProductFiles:
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedProduct:
     """A product that can be made.
 
     Attributes:
@@ -60,7 +61,7 @@ class Prepared:
 
 # The camera that reads a pad, unless another one is given.
 CAMERA_PX = (640, 480)
-Maker = Callable[["Design", "Layout"], Prepared]
+Maker = Callable[["Design", "Layout"], PreparedProduct]
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +225,7 @@ def refusal_of(name: str, design: Design) -> str:
     return ""
 
 
-def prepare(name: str, design: Design, layout: Layout) -> Prepared:
+def prepare(name: str, design: Design, layout: Layout) -> PreparedProduct:
     """A product of a design, checked and not yet drawn.
 
     Raises:
@@ -235,14 +236,14 @@ def prepare(name: str, design: Design, layout: Layout) -> Prepared:
     return maker(design, layout)
 
 
-def _make_svg(design: Design, layout: Layout) -> Prepared:
+def _make_svg(design: Design, layout: Layout) -> PreparedProduct:
     from cmpdesign.products.drawing.svg import layout_to_svg
 
     text = layout_to_svg(layout, ids=design.print_ids, scale=design.print_scale, mirror=design.print_mirror)
-    return Prepared(lambda: ProductFiles({PRODUCTS["svg"].where: text}))
+    return PreparedProduct(lambda: ProductFiles({PRODUCTS["svg"].where: text}))
 
 
-def _make_layout(design: Design, layout: Layout) -> Prepared:
+def _make_layout(design: Design, layout: Layout) -> PreparedProduct:
     from cmpdesign.files.layout_json import layout_to_json
 
-    return Prepared(lambda: ProductFiles({PRODUCTS["layout"].where: layout_to_json(layout)}))
+    return PreparedProduct(lambda: ProductFiles({PRODUCTS["layout"].where: layout_to_json(layout)}))

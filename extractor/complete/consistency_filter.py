@@ -1,4 +1,4 @@
-"""Stage 8, first half: markers that contradict their neighbours are dropped.
+"""Consistency: markers that contradict their neighbours are dropped.
 
 A marker must lie at the place that follows from the map of its two rings.
 """

@@ -1,4 +1,4 @@
-"""Stage 8: markers that contradict their neighbours are dropped, and lost markers are repaired where their neighbours
+"""Repair: markers that contradict their neighbours are dropped, and lost markers are repaired where their neighbours
 leave no doubt.
 
 Mild omission (the article's eq. 6): the triangles around a lost marker give its place; here all markers of two rings

@@ -1,4 +1,4 @@
-"""Stage 9: all markers are solved together, from profiles across the gridlines and then by synthesis.
+"""Refinement: all markers are solved together, from profiles across the gridlines and then by synthesis.
 
 Profiles reduce the error from a pixel to some hundredths of a pixel. From there a step by synthesis is a Gauss-Newton
 step on the likelihood of the whole image, with the curvature that includes the overlap of the gridlines at the corners.

@@ -39,7 +39,7 @@ EXTRACTED = {
 
 
 @dataclass(frozen=True)
-class Reading:
+class FrameReading:
     """Options of the reader; see ``extractor.Extractor``."""
 
     preset: Preset = "balanced"
@@ -108,7 +108,9 @@ def _cut_pictures(count: int, frames_a_shard: int) -> list[Piece]:
     return [Piece(start, min(frames_a_shard, count - start)) for start in starts]
 
 
-def prepare_extraction(layout: Reference, sources: Sequence[Mapping[str, Any]], options: Reading) -> Prepared:
+def prepare_extraction(
+    layout: Reference, sources: Sequence[Mapping[str, Any]], options: FrameReading
+) -> Prepared:
     """The plan of an extraction from indexed sources."""
     written = layout_from_reference(layout)
     plan = {
@@ -158,7 +160,7 @@ def _piece(plan: Mapping[str, Any], number: int) -> tuple[Mapping[str, Any], Pie
 def _extractor(folder: Path, digest: str) -> Extractor:
     """The reader of a plan, kept from shard to shard; the digest distinguishes plans in one folder."""
     plan = read_plan(folder)
-    reading = Reading(**plan["reading"])
+    reading = FrameReading(**plan["reading"])
     layout = named_layouts(folder, plan)[""]
     return Extractor(layout, reading.preset, reading.response, reading.side, reading.channels)
 

@@ -27,7 +27,7 @@ from cmpdesign.products.laser.setup import complete_setup
 from cmpdesign.products.process_sheet.html import sheet_to_html
 from cmpdesign.products.process_sheet.pdf import sheet_to_pdf
 from cmpdesign.products.process_sheet.steps import materials_csv
-from cmpdesign.products.registry import Prepared, ProductFiles
+from cmpdesign.products.registry import PreparedProduct, ProductFiles
 from cmpdesign.watch import tell
 
 FOLDER = "laser"
@@ -39,7 +39,7 @@ FORMATS: Mapping[str, Callable[[LaserDrawing], str]] = {
 }
 
 
-def prepare_laser(design: Design, layout: Layout) -> Prepared:
+def prepare_laser(design: Design, layout: Layout) -> PreparedProduct:
     """The folder ``laser/`` and the pad as carved.
 
     Raises:
@@ -49,7 +49,7 @@ def prepare_laser(design: Design, layout: Layout) -> Prepared:
     warnings = require_no_errors(setup_findings(design, job))
     figures = measure_as_made(job)
     warnings += require_no_errors(as_made_findings(job, figures))
-    return Prepared(partial(_make_laser, job, figures, warnings), made_pad(job))
+    return PreparedProduct(partial(_make_laser, job, figures, warnings), made_pad(job))
 
 
 def _make_laser(

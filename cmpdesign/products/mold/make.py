@@ -24,7 +24,7 @@ from cmpdesign.products.mold.parts import Part, make_parts
 from cmpdesign.products.mold.solids.loops import frustum_volume_mm3
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack, make_stack
 from cmpdesign.products.mold.step.assembly import Assembly, PartPlace, assembly_to_step
-from cmpdesign.products.registry import Prepared, ProductFiles
+from cmpdesign.products.registry import PreparedProduct, ProductFiles
 
 FOLDER = "mold"
 # Gap between the operations in the assembly.
@@ -32,7 +32,7 @@ OPERATION_SPACING_MM = 10.0
 BASE_OPERATION = "1-base"
 
 
-def prepare_mold(design: Design, layout: Layout) -> Prepared:
+def prepare_mold(design: Design, layout: Layout) -> PreparedProduct:
     """The STEP files of every part and of the assembly, and the pad as cast; no solid is built yet.
 
     Raises:
@@ -52,7 +52,7 @@ def prepare_mold(design: Design, layout: Layout) -> Prepared:
         figures = {"parts": {name: part.figures for name, part in finished.items()}, **mold_figures(stack)}
         return ProductFiles(files, figures, tuple(findings))
 
-    return Prepared(make, made_pad(layout, stack))
+    return PreparedProduct(make, made_pad(layout, stack))
 
 
 def mold_figures(stack: MoldStack) -> dict[str, Any]:

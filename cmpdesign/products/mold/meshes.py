@@ -32,7 +32,7 @@ from cmpdesign.products.mold.stack.stack import MoldStack, make_stack
 from cmpdesign.products.process_sheet.html import sheet_to_html
 from cmpdesign.products.process_sheet.pdf import sheet_to_pdf
 from cmpdesign.products.process_sheet.steps import materials_csv
-from cmpdesign.products.registry import Prepared, ProductFiles
+from cmpdesign.products.registry import PreparedProduct, ProductFiles
 
 FOLDER = "mesh"
 # Tolerance of a mesh's volume, as a share: of flat-sided solids, and of smooth crowns and pins (error of chords).
@@ -43,7 +43,7 @@ APART_MM = 5.0
 OPACITY = {"base": 0.35, "cover": 0.35}
 
 
-def prepare_meshes(design: Design, layout: Layout) -> Prepared:
+def prepare_meshes(design: Design, layout: Layout) -> PreparedProduct:
     """The triangle meshes of the mold's parts (as printed) and of the pad's silicone layers, and the pad as cast.
 
     Raises:
@@ -53,7 +53,7 @@ def prepare_meshes(design: Design, layout: Layout) -> Prepared:
     stack = make_stack(design, layout)
     findings = check_mold(stack)
     require_no_errors(findings)
-    return Prepared(partial(_make_meshes, design, layout, stack, findings), made_pad(layout, stack))
+    return PreparedProduct(partial(_make_meshes, design, layout, stack, findings), made_pad(layout, stack))
 
 
 def _make_meshes(

@@ -16,7 +16,7 @@ from cmpdesign.layout.outline import corner_offsets
 from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.as_made.made_pad import Cause, MadePad, make_pad
-from cmpdesign.products.registry import Prepared, ProductFiles
+from cmpdesign.products.registry import PreparedProduct, ProductFiles
 from cmpdesign.products.sheet.film import film_pages
 from cmpdesign.products.sheet.key import BAR_MM, CODE_MM, THICK_MM, X_BAR, Y_BAR, SheetKey
 from cmpdesign.products.sheet.page import (
@@ -47,13 +47,13 @@ TEXT_MM = 2.6
 Points = NDArray[np.float64]
 
 
-def prepare_print_sheet(design: Design, layout: Layout) -> Prepared:
+def prepare_print_sheet(design: Design, layout: Layout) -> PreparedProduct:
     """``print/sheet.svg``, ``print/sheet.pdf`` and ``print/film.pdf``, and the pad as printed.
 
     Raises:
         DesignError: nothing of a cell stays.
     """
-    return Prepared(partial(_make_print_sheet, design, layout), made_pad(design, layout))
+    return PreparedProduct(partial(_make_print_sheet, design, layout), made_pad(design, layout))
 
 
 def _make_print_sheet(design: Design, layout: Layout) -> ProductFiles:

@@ -11,7 +11,7 @@ import pytest
 from cmpdesign.data import load
 from cmpdesign.data.folder import open_folder
 from cmpdesign.data.shard import make_shard
-from cmpdesign.data.videos.extraction import Reading, index_source, name_tasks, prepare_extraction
+from cmpdesign.data.videos.extraction import FrameReading, index_source, name_tasks, prepare_extraction
 from cmpdesign.data.videos.pieces import piece_frames, video_pieces
 from cmpdesign.tracking.export.video import Codec, CodecVideo
 from cmpdesign.tracking.sources import open_source
@@ -110,7 +110,9 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_rows_are_what_the_extractor_finds(sources: Path, tmp_path: Path) -> None:
     texts = [str(sources / "press.mkv"), str(sources / "frames")]
     layout = load_layout(sources / "layout.json")
-    prepared = prepare_extraction(layout, [index_source(task) for task in name_tasks(texts, 1)], Reading())
+    prepared = prepare_extraction(
+        layout, [index_source(task) for task in name_tasks(texts, 1)], FrameReading()
+    )
     open_folder(tmp_path / "markers", prepared)
     for number in reversed(range(prepared.shards)):
         make_shard(str(tmp_path / "markers"), number)

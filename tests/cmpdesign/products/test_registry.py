@@ -20,7 +20,7 @@ from cmpdesign.products.drawing.preview import draw_preview
 from cmpdesign.products.registry import (
     PRODUCTS,
     USUAL_NAMES,
-    Prepared,
+    PreparedProduct,
     Product,
     ProductFiles,
     chosen_products,
@@ -35,9 +35,9 @@ FINDING = Finding("glue", 1.0, 2.0, "mm", "use more", "warning")
 def with_ruler(monkeypatch: pytest.MonkeyPatch) -> None:
     """A product as another module would add it: one line in the registry, one function."""
 
-    def ruler(design: Design, layout: Layout) -> Prepared:
+    def ruler(design: Design, layout: Layout) -> PreparedProduct:
         files = {"ruler/ruler.txt": design.pattern}
-        return Prepared(lambda: ProductFiles(files, {"ticks": len(layout.edges)}, (FINDING,)))
+        return PreparedProduct(lambda: ProductFiles(files, {"ticks": len(layout.edges)}, (FINDING,)))
 
     module = ModuleType("ruler")
     module.ruler = ruler  # type: ignore[attr-defined]
@@ -70,7 +70,7 @@ def test_pictures_of_a_product_are_shown_in_the_preview(monkeypatch: pytest.Monk
     module = ModuleType("camera")
     # type: ignore[attr-defined]
     product = ProductFiles({"a.txt": ""}, pictures={"tall": tall, "wide": wide})
-    module.make = lambda design, layout: Prepared(lambda: product)
+    module.make = lambda design, layout: PreparedProduct(lambda: product)
     monkeypatch.setitem(sys.modules, "camera", module)
     monkeypatch.setattr(products, "PRODUCTS", {**PRODUCTS, "camera": Product("camera:make", "a.txt")})
     files, _ = make("camera")

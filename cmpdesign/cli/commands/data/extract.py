@@ -47,11 +47,11 @@ def extract(
     """
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler
-    from cmpdesign.data.videos.extraction import Reading
+    from cmpdesign.data.videos.extraction import FrameReading
     from cmpdesign.watch import watched
     from extractor import load_layout
 
-    reading = Reading(preset, parse_reading_response(response), side, channels)
+    reading = FrameReading(preset, parse_reading_response(response), side, channels)
     where, reference = parse_scheduler(scheduler, workers), load_layout(layout)
     with working("extracting") as steps, watched(steps.tell):
         made = extract_markers(reference, sources, output, reading, where, frames_a_shard)
