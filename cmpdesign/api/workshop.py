@@ -209,11 +209,11 @@ def evaluate(
         OutputError: a file cannot be written; finished trials are kept.
     """
     from cmpdesign.documents.runs import EvaluateDocument
-    from cmpdesign.evaluate import experiments
-    from cmpdesign.evaluate.defaults import PRESETS, USUAL_TRIALS
-    from cmpdesign.evaluate.designs import design_entries
-    from cmpdesign.evaluate.runner import RunOptions
-    from cmpdesign.evaluate.simulated.sensor import load_sensor
+    from cmpdesign.evaluation import experiments
+    from cmpdesign.evaluation.defaults import PRESETS, USUAL_TRIALS
+    from cmpdesign.evaluation.designs import design_entries
+    from cmpdesign.evaluation.runner import RunOptions
+    from cmpdesign.evaluation.simulated.sensor import load_sensor
 
     if preset not in PRESETS:
         raise CmpDesignError(f"preset {preset}: unknown; there are {', '.join(PRESETS)}")
@@ -251,13 +251,13 @@ def export_lerobot(
         OutputError: the data set cannot be written, or the folder exists.
     """
     from cmpdesign.documents.runs import ExportDocument
-    from cmpdesign.tracking.export.lerobot import DataSet, write_lerobot
+    from cmpdesign.tracking.export.lerobot import LeRobotDataSet, write_lerobot
     from cmpdesign.tracking.export.runs import frames_per_second, require_one_kind, tidy_fps
 
     paths = _paths(runs)
     require_one_kind(paths)
     rate = frames_per_second(paths) if fps is None else tidy_fps(fps)
-    about = DataSet(rate, task, robot, tuple(map(str, images)), max_pixels)
+    about = LeRobotDataSet(rate, task, robot, tuple(map(str, images)), max_pixels)
     frames = write_lerobot(paths, Path(output), about)
     return ExportDocument(kind="lerobot", written=str(output), episodes=len(paths), frames=frames, fps=rate)
 

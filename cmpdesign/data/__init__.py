@@ -10,20 +10,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cmpdesign.data.integrity import Checked as Checked
+    from cmpdesign.data.integrity import CheckedDataSet as CheckedDataSet
     from cmpdesign.data.integrity import check as check
     from cmpdesign.data.reader import DataSet as DataSet
     from cmpdesign.data.reader import Frame as Frame
     from cmpdesign.data.reader import load as load
 
 _HOMES = {
-    "Checked": "cmpdesign.data.integrity",
+    "CheckedDataSet": "cmpdesign.data.integrity",
     "DataSet": "cmpdesign.data.reader",
     "Frame": "cmpdesign.data.reader",
     "check": "cmpdesign.data.integrity",
     "load": "cmpdesign.data.reader",
 }
-__all__ = ["Checked", "DataSet", "Frame", "check", "load"]
+__all__ = ["CheckedDataSet", "DataSet", "Frame", "check", "load"]
 
 
 def __getattr__(name: str) -> Any:

@@ -24,7 +24,7 @@ from extractor import ExtractorError
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedDataSet:
     """The result of a check.
 
     Attributes:
@@ -41,7 +41,7 @@ class Checked:
     problems: tuple[str, ...]
 
 
-def check(folder: str | Path) -> Checked:
+def check(folder: str | Path) -> CheckedDataSet:
     """Compare every file of a data set with its digest: layouts, inputs, and all files of the finished shards.
 
     The digests are in the data set itself: they show damage, and not who made the files.
@@ -69,7 +69,7 @@ def check(folder: str | Path) -> Checked:
     problems += _manifest_problems(folder, whole, numbers)
     sizes = [about.bytes for record in whole for about in record.files.values()]
     frames = sum(record.frames for record in whole)
-    return Checked(len(whole), number_of_shards(plan), frames, sum(sizes), tuple(problems))
+    return CheckedDataSet(len(whole), number_of_shards(plan), frames, sum(sizes), tuple(problems))
 
 
 def _named_file_problems(folder: Path, plan: Mapping[str, Any]) -> Iterator[str]:

@@ -37,7 +37,7 @@ _LIBRARIES = ("numpy", *OPENCV_DISTRIBUTIONS, "scipy")
 _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same bundle has the same bytes
 
 
-class Settings(Record):
+class ReaderSettings(Record):
     """Options of the reading."""
 
     preset: Preset
@@ -58,7 +58,7 @@ class ReportDocument(Record):
 
     format: Literal["cmp-problem-report"]
     version: Literal[1]
-    settings: Settings
+    settings: ReaderSettings
     versions: dict[Name, Name] = Field(max_length=50)
     pictures: list[ReportedPicture] = Field(min_length=1, max_length=MOST_PICTURES)
 

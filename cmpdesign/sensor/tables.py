@@ -99,7 +99,7 @@ class ConditionRanges(_StrictTable):
         return self
 
 
-class CameraCalibration(_StrictTable):
+class CameraCalibrationTable(_StrictTable):
     """What ``calibrate camera`` found."""
 
     date: datetime.date | None = None
@@ -116,7 +116,7 @@ class CameraCalibration(_StrictTable):
     covariance: tuple[tuple[float, ...], ...] = ()
 
     @model_validator(mode="after")
-    def _covariance(self) -> CameraCalibration:
+    def _covariance(self) -> CameraCalibrationTable:
         count = len(self.parameters)
         if any(len(row) != count for row in self.covariance) or len(self.covariance) not in (0, count):
             raise ValueError(
@@ -129,7 +129,7 @@ class CameraCalibration(_StrictTable):
         return self
 
 
-class RigCalibration(_StrictTable):
+class RigCalibrationTable(_StrictTable):
     """What ``calibrate rig`` found."""
 
     date: datetime.date | None = None
@@ -147,8 +147,8 @@ class RigCalibration(_StrictTable):
 class Calibrations(_StrictTable):
     """The sensor's calibrations."""
 
-    camera: CameraCalibration | None = None
-    rig: RigCalibration | None = None
+    camera: CameraCalibrationTable | None = None
+    rig: RigCalibrationTable | None = None
 
 
 class CameraTable(_StrictTable):

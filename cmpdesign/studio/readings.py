@@ -31,7 +31,7 @@ _PICTURE = "picture"
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class StudioReading:
     """One picture and its verdict.
 
     Attributes:
@@ -98,10 +98,10 @@ class Readings:
     """The last readings of this run of the page."""
 
     def __init__(self) -> None:
-        self._readings: dict[str, Reading] = {}
+        self._readings: dict[str, StudioReading] = {}
         self._verifiers: dict[str, Verifier] = {}
 
-    def read(self, reference: Reference, name: str, data: bytes) -> Reading:
+    def read(self, reference: Reference, name: str, data: bytes) -> StudioReading:
         """Read a picture.
 
         Raises:
@@ -120,13 +120,13 @@ class Readings:
             if isinstance(error, CmpDesignError):
                 raise CmpDesignError(str(error).replace(str(file), name)) from None
             raise
-        reading = Reading(secrets.token_hex(8), name, file, verifier, image, verdict)
+        reading = StudioReading(secrets.token_hex(8), name, file, verifier, image, verdict)
         self._readings[reading.key] = reading
         for old in list(self._readings.values())[:-MOST_KEPT]:
             self._forget(old)
         return reading
 
-    def get(self, key: str) -> Reading:
+    def get(self, key: str) -> StudioReading:
         """A reading by its key.
 
         Raises:
@@ -141,7 +141,7 @@ class Readings:
         for reading in list(self._readings.values()):
             self._forget(reading)
 
-    def _forget(self, reading: Reading) -> None:
+    def _forget(self, reading: StudioReading) -> None:
         self._readings.pop(reading.key, None)
         shutil.rmtree(reading.file.parent, ignore_errors=True)
 

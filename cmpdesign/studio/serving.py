@@ -66,7 +66,7 @@ def serve(
         timer.daemon = True
         timer.start()
 
-    class Server(uvicorn.Server):
+    class StudioServer(uvicorn.Server):
         """Ends at the first Ctrl-C and returns; uvicorn's own server raises the signal again, past all clean-up."""
 
         @contextmanager
@@ -78,7 +78,7 @@ def serve(
                 for one, handler in earlier.items():
                     signal.signal(one, handler)
 
-    Server(config).run(sockets=[listening])
+    StudioServer(config).run(sockets=[listening])
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -15,7 +15,7 @@ from cmpdesign.inputs.sources import NamedSource, SourceKind
 from cmpdesign.tracking.sources import Reading, open_named
 
 
-class Picture(NamedTuple):
+class SourcePicture(NamedTuple):
     """An image as a file: name without folder, and content."""
 
     name: str
@@ -40,15 +40,15 @@ class SourceImage:
     problem: str
     path: Path | None
 
-    def picture(self) -> Picture:
+    def picture(self) -> SourcePicture:
         """The image's own file, unchanged; for a frame, a PNG.
 
         Raises:
             InputError: the file can no longer be read.
         """
         if self.path is None:
-            return Picture(f"{self.stem}.png", to_png(self.image))
-        return Picture(f"{self.stem}{self.path.suffix}", read_file(self.path))
+            return SourcePicture(f"{self.stem}.png", to_png(self.image))
+        return SourcePicture(f"{self.stem}{self.path.suffix}", read_file(self.path))
 
 
 def count_images(sources: Iterable[NamedSource], frames: int | None) -> int | None:

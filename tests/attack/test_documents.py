@@ -13,7 +13,7 @@ import pytest
 
 from cmpdesign.documents.registry import document_schema_text
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.journal import Journal
+from cmpdesign.evaluation.journal import Journal
 from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files
 from tests.attack.documents import wrong_documents
 from tests.support.command import run

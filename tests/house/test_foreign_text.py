@@ -41,12 +41,12 @@ READS = {
     "cmpdesign/inputs/videos.py": {"open 'r'"},  # of a video or a stream, by PyAV
     "cmpdesign/files/video_writer.py": {"cv2.VideoCapture"},  # of the video that it wrote
     "cmpdesign/tracking/sinks/csv_recovery.py": {"open 'r+b'"},  # to cut the text behind its last whole frame
-    "cmpdesign/evaluate/journal.py": {
+    "cmpdesign/evaluation/journal.py": {
         "read_bytes",
         "open 'r+b'",
     },  # the installed code's digest; its own last line
     "cmpdesign/products/mold/processes.py": {"os.fdopen"},  # to write to a process
-    "cmpdesign/evaluate/runner.py": {"json.loads"},  # of a text that it just made
+    "cmpdesign/evaluation/runner.py": {"json.loads"},  # of a text that it just made
     "cmpdesign/libraries.py": {"read_text", "json.loads"},  # what pip noted beside the installed package
 }
 READING = {

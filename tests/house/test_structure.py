@@ -33,13 +33,15 @@ PACKAGES = ("extractor", "cmpdesign")
 ROOMS = {
     "cmpdesign": (
         "errors libraries units workers watch inputs documents patterns design layout files sensor reading calibration"
-        " contact scene products tracking runtime evaluate data api proposal studio cli demo __main__"
+        " contact scene products tracking runtime evaluation data api proposal studio cli demo __main__"
     ),
     "extractor": (
         "errors frozen_record quality result presets numeric layout image cells localmap numbering refine complete"
         " pipeline made contact track space draw"
     ),
 }
+# Names of the Python calls, which wrap the values of the same name: `cmpdesign.Design`, `cmpdesign.runtime.Sensor`.
+OF_THE_CALLS = {"Camera", "Design", "Layout", "Sensor"}
 NOT_DESCRIBED = {"extractor", "cmpdesign"}
 EXTRACTOR_NEEDS = {"numpy", "cv2"}
 MAX_FILES, MAX_LINES, MAX_FUNCTION_LINES, MAX_PARAMETERS = 12, 500, 80, 8
@@ -229,6 +231,21 @@ def matched(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]
     return [(target, value)]
 
 
+def doubled_class_names(root: Path) -> list[str]:
+    """A public class of a package has its name alone."""
+    found: dict[tuple[str, str], list[Path]] = {}
+    for package in PACKAGES:
+        for path in python_files(root / package):
+            for node in parsed(path).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    found.setdefault((package, node.name), []).append(path)
+    return [
+        f"{package}: {name} is defined by {len(paths)} files: {', '.join(map(str, paths))}"
+        for (package, name), paths in found.items()
+        if len(paths) > 1 and name not in OF_THE_CALLS
+    ]
+
+
 RULES: tuple[Rule, ...] = (
     crowded_folders,
     undescribed_packages,
@@ -239,6 +256,7 @@ RULES: tuple[Rule, ...] = (
     products_that_know_patterns,
     many_parameters,
     unpacked_parameters,
+    doubled_class_names,
 )
 
 
@@ -316,6 +334,11 @@ BAD: tuple[tuple[Rule, dict[str, str], str], ...] = (
         unpacked_parameters,
         {"extractor/errors.py": "def f(place):\n    x, y = place\n"},
         "f takes place apart",
+    ),
+    (
+        doubled_class_names,
+        {"extractor/numeric/sums.py": "class LayoutError: ...\n"},
+        "LayoutError is defined by 2 files",
     ),
     (unpacked_parameters, {"extractor/errors.py": "def f(a, b):\n    (x, y), z = a, b\n"}, "f takes a apart"),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from cmpdesign.evaluate.simulated.sensor import load_sensor
+from cmpdesign.evaluation.simulated.sensor import load_sensor
 
 CHANGES = (
     ("size_px = [1280, 720]", "size_px = [640, 360]"),

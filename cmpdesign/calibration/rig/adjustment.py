@@ -32,7 +32,7 @@ OFF_PLANE = 6.0  # median deviations from the plane, from which a marker is not 
 LARGE = 1e6  # deviations of a point without a picture, so that a step there is refused
 
 
-class Step(NamedTuple):
+class RigStep(NamedTuple):
     """The markers under a plate.
 
     Attributes:
@@ -62,8 +62,8 @@ class RigProblem:
     unknowns: Unknowns
     stated: Array
     rest_mm: Array
-    rest: Step
-    steps: tuple[Step, ...] = ()
+    rest: RigStep
+    steps: tuple[RigStep, ...] = ()
     step_sigma_mm: float = 0.005
 
     @property
@@ -144,7 +144,7 @@ class _Whole:
     """A problem with its steps' markers below the plate, and first places (M, 2) of these."""
 
     problem: RigProblem
-    steps: tuple[Step, ...]
+    steps: tuple[RigStep, ...]
     places: tuple[Array, ...]
 
     def equations(self, state: _State) -> _Equations:
@@ -165,7 +165,7 @@ class _Whole:
             right += flat.T @ residual.ravel()
         return _Equations(normal, right, float(sum((one**2).sum() for _, one in parts)), count)
 
-    def _step_part(self, state: _State, number: int, step: Step, at: Array) -> tuple[Array, Array]:
+    def _step_part(self, state: _State, number: int, step: RigStep, at: Array) -> tuple[Array, Array]:
         """The design (M, 2 V, P + Q) and the residuals (M, 2 V) of a step, without the markers' places."""
         unknowns, half_mm = self.problem.unknowns, self.problem.half_mm
         offset, *tilt = state.plate[:3]
@@ -239,7 +239,7 @@ def _pictures(views: tuple[View, ...], xyz_mm: Array) -> _Pictures:
     return _Pictures(np.stack([one.xy_px for one in linear]), np.stack([one.by_point for one in linear]))
 
 
-def _whitened(step: Step, shown_px: Array) -> tuple[Array, Array]:
+def _whitened(step: RigStep, shown_px: Array) -> tuple[Array, Array]:
     """The residuals (M, 2 V) in deviations, and the whitening matrices (V, M, 2, 2); 0 where not seen."""
     seen = is_finite(step.xy_px) & is_covariance(step.cov_px2)
     cov = np.where(seen[..., None, None], step.cov_px2, np.eye(2))
@@ -254,7 +254,7 @@ def _by_marker(values: Array) -> Array:
     return np.moveaxis(np.nan_to_num(values), 0, 1).reshape(values.shape[1], -1, values.shape[3])
 
 
-def _start_places(views: Sequence[View], step: Step) -> Array:
+def _start_places(views: Sequence[View], step: RigStep) -> Array:
     """(M, 2) mm, the markers' places below the plate by the first views; NaN for markers that are not below it."""
     found = triangulate(views, step.xy_px, step.cov_px2).xyz_mm
     known = is_finite(found)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.calibration.rig.adjustment import AdjustedRig, RigProblem, Step, adjust_rig
+from cmpdesign.calibration.rig.adjustment import AdjustedRig, RigProblem, RigStep, adjust_rig
 from cmpdesign.calibration.rig.mirrors import MirrorPair, mirror_pairs
 from cmpdesign.calibration.rig.unknowns import Unknowns
 from cmpdesign.errors import CmpDesignError
@@ -101,12 +101,12 @@ def calibrate_rig_markers(
     return _summary(problem, found, rig)
 
 
-def _as_step(markers: Sequence[Markers], press_mm: float) -> Step:
+def _as_step(markers: Sequence[Markers], press_mm: float) -> RigStep:
     measured = [np.where((m.status == Status.MEASURED)[:, None], m.xy_px, np.nan) for m in markers]
-    return Step(press_mm, np.stack(measured), np.stack([m.cov_px2 for m in markers]))
+    return RigStep(press_mm, np.stack(measured), np.stack([m.cov_px2 for m in markers]))
 
 
-def _mean_of(pictures: Sequence[Step]) -> Step:
+def _mean_of(pictures: Sequence[RigStep]) -> RigStep:
     """Means of the markers over pictures at rest, weighted by information."""
     if len(pictures) == 1:
         return pictures[0]
@@ -121,7 +121,7 @@ def _mean_of(pictures: Sequence[Step]) -> Step:
         seen[..., None, None], np.linalg.inv(np.where(seen[..., None, None], total, np.eye(2))), np.nan
     )
     pulled = sum(w @ np.nan_to_num(one.xy_px)[..., None] for w, one in zip(weights, pictures, strict=True))
-    return Step(0.0, np.where(seen[..., None], (cov @ pulled)[..., 0], np.nan), cov)
+    return RigStep(0.0, np.where(seen[..., None], (cov @ pulled)[..., 0], np.nan), cov)
 
 
 def _require_covariance(camera_cov: Array | None, unknowns: Unknowns) -> None:

@@ -13,7 +13,7 @@ from cmpdesign.cli.options.images import PresetOption
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.defaults import USUAL_TRIALS
+from cmpdesign.evaluation.defaults import USUAL_TRIALS
 
 app = typer.Typer(
     cls=Group,

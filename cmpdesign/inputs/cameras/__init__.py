@@ -4,7 +4,7 @@ In: the kernel's list of devices, a text that names a camera, wanted settings. O
 and the settings that its driver answers.
 """
 
-from cmpdesign.inputs.cameras.listing import Camera as Camera
+from cmpdesign.inputs.cameras.listing import ListedCamera as ListedCamera
 from cmpdesign.inputs.cameras.listing import camera_of_path as camera_of_path
 from cmpdesign.inputs.cameras.listing import find_camera as find_camera
 from cmpdesign.inputs.cameras.listing import list_cameras as list_cameras

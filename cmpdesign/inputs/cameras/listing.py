@@ -22,7 +22,7 @@ _PARENTS = 4  # from a device to the USB device that has the serial number
 
 
 @dataclass(frozen=True)
-class Camera:
+class ListedCamera:
     """A device of Linux that takes pictures.
 
     Attributes:
@@ -42,7 +42,7 @@ class Camera:
     offer: CameraOffer
 
 
-def list_cameras() -> list[Camera]:
+def list_cameras() -> list[ListedCamera]:
     """The cameras, by number; a device that takes no pictures, as one of meta data, is left out.
 
     Raises:
@@ -53,7 +53,7 @@ def list_cameras() -> list[Camera]:
     return sorted(_found(), key=lambda camera: camera.number)
 
 
-def find_camera(text: str) -> Camera | None:
+def find_camera(text: str) -> ListedCamera | None:
     """The camera with this serial number, or with this text in its name; None if there is none.
 
     Raises:
@@ -81,7 +81,7 @@ def camera_of_path(text: str) -> int | None:
     return None
 
 
-def _found() -> Iterator[Camera]:
+def _found() -> Iterator[ListedCamera]:
     by_id = {link.resolve(): str(link) for link in sorted((DEVICES / "v4l" / "by-id").glob("*"))}
     for entry in SYSTEM.glob("video*"):
         match = _DEVICE.fullmatch(entry.name)
@@ -91,7 +91,7 @@ def _found() -> Iterator[Camera]:
         offer = offer_of(str(path))
         if offer.formats or offer.problem.startswith("cannot"):
             name = _text(entry / "name") or entry.name
-            yield Camera(int(match[1]), str(path), name, _serial(entry), by_id.get(path, ""), offer)
+            yield ListedCamera(int(match[1]), str(path), name, _serial(entry), by_id.get(path, ""), offer)
 
 
 def _serial(entry: Path) -> str:

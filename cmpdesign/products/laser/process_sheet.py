@@ -20,7 +20,7 @@ from cmpdesign.products.materials.weighing import (
     silicone_materials,
     weigh,
 )
-from cmpdesign.products.process_sheet.steps import Material, ProcessSheet, Step, Table, materials_table
+from cmpdesign.products.process_sheet.steps import NeededMaterial, ProcessSheet, Step, Table, materials_table
 
 # A sheet is larger than the job by this margin on every side, to be held and cut off.
 SHEET_MARGIN_MM = 10.0
@@ -64,7 +64,7 @@ def weighings(job: LaserJob) -> dict[str, Weighing]:
     }
 
 
-def bill_of_materials(job: LaserJob) -> tuple[Material, ...]:
+def bill_of_materials(job: LaserJob) -> tuple[NeededMaterial, ...]:
     """All that one pad needs."""
     material, extent = job.setup.material, job.extent_mm
     width, height = (
@@ -72,14 +72,20 @@ def bill_of_materials(job: LaserJob) -> tuple[Material, ...]:
     )
     size = f"{width:.0f} x {height:.0f}"
     pins = [
-        Material(f"pin, {job.layout.fiducial_diameter_mm:g} mm", "register", len(job.fiducials_mm), "piece"),
-        Material(f"acrylic plate, {size} x {PLATE_MM:g} mm", "carries the pins and the sheet", 1, "piece"),
+        NeededMaterial(
+            f"pin, {job.layout.fiducial_diameter_mm:g} mm", "register", len(job.fiducials_mm), "piece"
+        ),
+        NeededMaterial(
+            f"acrylic plate, {size} x {PLATE_MM:g} mm", "carries the pins and the sheet", 1, "piece"
+        ),
     ]
     return (
-        Material(f"{material.name}, {size} x {material.thickness_mm.value:g} mm", "marker layer", 1, "piece"),
+        NeededMaterial(
+            f"{material.name}, {size} x {material.thickness_mm.value:g} mm", "marker layer", 1, "piece"
+        ),
         *silicone_materials(weighings(job).values()),
         *(pins if len(job.fiducials_mm) else []),
-        Material("isopropanol, cups, spatula, cloths without lint, gloves", "consumables", 1, "set"),
+        NeededMaterial("isopropanol, cups, spatula, cloths without lint, gloves", "consumables", 1, "set"),
     )
 
 

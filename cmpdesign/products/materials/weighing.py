@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.materials.silicones import Silicone
-from cmpdesign.products.process_sheet.steps import Material, Table
+from cmpdesign.products.process_sheet.steps import NeededMaterial, Table
 
 # Less than a gram of either part cannot be weighed to a percent on a scale of 0.01 g.
 LEAST_PART_G = 1.0
@@ -65,7 +65,7 @@ def weigh(name: str, silicone: Silicone, volume_mm3: float, *, dough: bool = Fal
     return Weighing(name, silicone, cast_g, a_g, b_g, pigment * both_g, retarder * both_g, thickener * both_g)
 
 
-def silicone_materials(mixes: Iterable[Weighing]) -> list[Material]:
+def silicone_materials(mixes: Iterable[Weighing]) -> list[NeededMaterial]:
     """The lines of the bill of materials: parts A and B by silicone, additives by layer."""
     masses: dict[tuple[str, str], float] = {}
     for one in mixes:
@@ -79,7 +79,7 @@ def silicone_materials(mixes: Iterable[Weighing]) -> list[Material]:
         for item, mass_g in amounts.items():
             use = "silicone layers" if ", part " in item else f"{one.name} layer"
             masses[item, use] = masses.get((item, use), 0.0) + mass_g
-    return [Material(item, use, mass_g, "g") for (item, use), mass_g in masses.items() if mass_g > 0]
+    return [NeededMaterial(item, use, mass_g, "g") for (item, use), mass_g in masses.items() if mass_g > 0]
 
 
 def mixing_checks(mix: Weighing) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ DEPTH_JUMP, SHADE_JUMP = 0.004, 0.07
 
 
 @dataclass(frozen=True)
-class ViewDirection:
+class PictureDirection:
     """Direction towards the viewer: the angle about z from the x axis, and the elevation over the xy plane."""
 
     azimuth_deg: float
@@ -36,7 +36,7 @@ class ViewDirection:
         return np.stack([right, np.cross(towards, right), towards])
 
 
-ABOVE, BELOW = ViewDirection(-60.0, 35.0), ViewDirection(-60.0, -35.0)
+ABOVE, BELOW = PictureDirection(-60.0, 35.0), PictureDirection(-60.0, -35.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Framing:
 
     @classmethod
     def of(
-        cls, meshes: Sequence[TriangleMesh], direction: ViewDirection, size_px: tuple[int, int]
+        cls, meshes: Sequence[TriangleMesh], direction: PictureDirection, size_px: tuple[int, int]
     ) -> Framing:
         """The framing of meshes in a picture of ``size_px`` (width, height), with a margin of ``MARGIN_SHARE``."""
         projected = np.concatenate([mesh.points for mesh in meshes]) @ direction.axes().T
@@ -72,7 +72,7 @@ class Framing:
 
 
 def draw_meshes(
-    meshes: Sequence[TriangleMesh], direction: ViewDirection, size_px: tuple[int, int]
+    meshes: Sequence[TriangleMesh], direction: PictureDirection, size_px: tuple[int, int]
 ) -> NDArray[np.uint8]:
     """Draw meshes so that they fill a picture.
 
@@ -108,7 +108,7 @@ def _color_bgr(color: str) -> Floats:
     return np.array([int(color[i : i + 2], 16) for i in (5, 3, 1)], dtype=np.float64)
 
 
-def _triangle_shades(corners: Floats, direction: ViewDirection) -> Floats:
+def _triangle_shades(corners: Floats, direction: PictureDirection) -> Floats:
     """(T,) brightness of each triangle; the light's y component is mirrored for pictures from below."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)

@@ -18,7 +18,7 @@ from cmpdesign.products.materials.weighing import (
 from cmpdesign.products.mold.make import mold_figures, pad_sizes_mm
 from cmpdesign.products.mold.parts import Part
 from cmpdesign.products.mold.stack.stack import SILICONE_LAYERS, MoldStack
-from cmpdesign.products.process_sheet.steps import Material, ProcessSheet, Step, materials_table
+from cmpdesign.products.process_sheet.steps import NeededMaterial, ProcessSheet, Step, materials_table
 
 _FOOTNOTE = (
     "* assumed. The value is a field of the silicone's file: copy templates/silicones/NAME.toml, change the value and "
@@ -68,18 +68,20 @@ def process_sheet(
     return ProcessSheet(f"Casting {name}", (_side_text(stack),), tuple(steps), _FOOTNOTE)
 
 
-def bill_of_materials(stack: MoldStack, parts: Sequence[Part]) -> tuple[Material, ...]:
+def bill_of_materials(stack: MoldStack, parts: Sequence[Part]) -> tuple[NeededMaterial, ...]:
     """All that the mold and one pad need."""
     tool = stack.options.tool
     made = [
-        Material(f"mold part {one.name}", f"made of {tool}", 1, "piece") for one in parts if one.name != "pin"
+        NeededMaterial(f"mold part {one.name}", f"made of {tool}", 1, "piece")
+        for one in parts
+        if one.name != "pin"
     ]
     return (
         *silicone_materials(weighings(stack)),
         *made,
-        Material(f"dowel pin, {stack.pin_diameter_mm:g} mm", "register of the parts", 4, "piece"),
-        Material("screw M3", "jack screws that lift lid and plates", 2, "piece"),
-        Material("release agent, isopropanol, cups, gloves", "consumables", 1, "set"),
+        NeededMaterial(f"dowel pin, {stack.pin_diameter_mm:g} mm", "register of the parts", 4, "piece"),
+        NeededMaterial("screw M3", "jack screws that lift lid and plates", 2, "piece"),
+        NeededMaterial("release agent, isopropanol, cups, gloves", "consumables", 1, "set"),
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.products.mesh.picture import ABOVE, BELOW, Framing, ViewDirection, draw_label, draw_meshes
+from cmpdesign.products.mesh.picture import ABOVE, BELOW, Framing, PictureDirection, draw_label, draw_meshes
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold.parts import Part
 
@@ -17,7 +17,7 @@ SIZE_PX = (560, 400)
 EXPLODED_PX = (860, 1200)
 # Width right of the exploded parts, for their names.
 NAMES_PX = 170
-EXPLODED_VIEW = ViewDirection(-60.0, 22.0)
+EXPLODED_VIEW = PictureDirection(-60.0, 22.0)
 # Gap between exploded parts, as a share of their width.
 EXPLODED_GAP_SHARE = 0.2
 EXPLODED_NAME = "exploded"

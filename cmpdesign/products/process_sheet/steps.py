@@ -52,7 +52,7 @@ class ProcessSheet:
     footnote: str
 
 
-class Material(NamedTuple):
+class NeededMaterial(NamedTuple):
     """A line of the bill of materials; the part number is left to the shop."""
 
     item: str
@@ -61,16 +61,16 @@ class Material(NamedTuple):
     unit: str
 
 
-def materials_csv(materials: Sequence[Material]) -> str:
+def materials_csv(materials: Sequence[NeededMaterial]) -> str:
     """The bill of materials as CSV: item, use, amount, unit, part_number (empty)."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*Material._fields, "part_number"])
+    writer.writerow([*NeededMaterial._fields, "part_number"])
     writer.writerows([one.item, one.use, f"{one.amount:.6g}", one.unit, ""] for one in materials)
     return text.getvalue()
 
 
-def materials_table(materials: Sequence[Material]) -> Table:
+def materials_table(materials: Sequence[NeededMaterial]) -> Table:
     """The bill of materials as a table."""
     rows = tuple((one.item, one.use, f"{one.amount:.4g} {one.unit}", "") for one in materials)
     return Table(("item", "use", "amount", "part number"), rows)

@@ -51,13 +51,13 @@ TYPE_NAME = re.compile(r"float|str|[a-z-]+\[.*\]", re.DOTALL)  # as pydantic wri
 Value = float | tuple[float, ...]
 
 
-class Table(BaseModel):
+class SceneTable(BaseModel):
     """Base of all tables: strict and frozen."""
 
     model_config = ConfigDict(frozen=True, **STRICT)  # type: ignore[typeddict-item]
 
 
-class ViewTable(Table):
+class ViewTable(SceneTable):
     """[[view]]: a pinhole, placed by its pose or by its target."""
 
     name: str = ""
@@ -133,7 +133,7 @@ class ViewTable(Table):
         return replace(Pinhole.looking(size, mirror=bool(self.mirrored), **looking), window=window)
 
 
-class SurfaceTable(Table):
+class SurfaceTable(SceneTable):
     """[surface]: deformations, applied in the file's order."""
 
     press: Press | None = None
@@ -142,7 +142,7 @@ class SurfaceTable(Table):
     dent: Dent | None = None
 
 
-class SequenceTable(Table):
+class SequenceTable(SceneTable):
     """[sequence]: the number of frames, and the values that change.
 
     ``values`` holds, for a dotted path of names, key frames [time in s, value]. Values are linear between key frames.
@@ -167,14 +167,14 @@ class SequenceTable(Table):
         return self
 
 
-class BackgroundTable(Table):
+class BackgroundTable(SceneTable):
     """[background] of a picture; generated backgrounds have the names of their dataclass."""
 
     kind: Literal["picture"]
     path: str
 
 
-class SceneTables(Table):
+class SceneTables(SceneTable):
     """A whole scene file. Absent tables are None and not computed."""
 
     size_px: tuple[int, int] = (640, 480)

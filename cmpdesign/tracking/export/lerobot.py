@@ -44,7 +44,7 @@ BYTES_A_MB = 1 << 20
 
 
 @dataclass(frozen=True)
-class DataSet:
+class LeRobotDataSet:
     """The parameters of a data set.
 
     Attributes:
@@ -62,7 +62,7 @@ class DataSet:
     most_pixels: int = MOST_PIXELS
 
 
-def write_lerobot(runs: Sequence[Path], path: Path, about: DataSet) -> int:
+def write_lerobot(runs: Sequence[Path], path: Path, about: LeRobotDataSet) -> int:
     """Write a data set; the data set is complete on disk before it gets its name.
 
     Args:
@@ -94,7 +94,7 @@ def write_lerobot(runs: Sequence[Path], path: Path, about: DataSet) -> int:
     return frames
 
 
-def _write_folder(folder: Path, runs: Sequence[Path], about: DataSet) -> int:
+def _write_folder(folder: Path, runs: Sequence[Path], about: LeRobotDataSet) -> int:
     data, video = _DataFiles(folder), _VideoFiles(folder, about.fps) if about.images else None
     rows: list[dict[str, Any]] = []
     stats: list[dict[str, Statistics]] = []

@@ -15,7 +15,7 @@ import cmpdesign
 from cmpdesign.calibration.rig.calibration import RigCalibration, calibrate_rig_markers
 from cmpdesign.calibration.rig.mirrors import mirror_pairs
 from cmpdesign.calibration.rig.unknowns import Unknowns
-from cmpdesign.evaluate.simulated.sensor import parse_sensor
+from cmpdesign.evaluation.simulated.sensor import parse_sensor
 from cmpdesign.scene import Medium as DrawnMedium
 from cmpdesign.scene import Pinhole, render
 from cmpdesign.sensor.sensor_file import load_sensor_file

@@ -33,7 +33,7 @@ STAGES = re.compile(r"\.cmpdesign-[a-z0-9_]{8}")
 # What may open files for writing, beside modules that stage them.
 MAY_WRITE = {
     "cmpdesign/files/atomic.py": "the place itself",
-    "cmpdesign/evaluate/journal.py": "grows, under a lock",
+    "cmpdesign/evaluation/journal.py": "grows, under a lock",
     "cmpdesign/tracking/sinks/csv_sink.py": "grows, under a lock, opened exclusively",
     "cmpdesign/tracking/sinks/unfinished.py": "names the tables that grow",
     "cmpdesign/tracking/sinks/assembly.py": "is given a staged path",

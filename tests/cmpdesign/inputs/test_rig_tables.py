@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmpdesign.evaluate.simulated.sensor import SensorTable
+from cmpdesign.evaluation.simulated.sensor import SensorTable
 from cmpdesign.scene.files.tables import SceneTables
 from extractor import RigError, parse_rig
 from tests.support.hostile.input_files import RIG

@@ -14,8 +14,8 @@ import numpy as np
 from cmpdesign.contact.objects.heightmap import HeightMap
 from cmpdesign.design.design import load_design
 from cmpdesign.design.templates import templates_folder
-from cmpdesign.evaluate.journal import JOURNAL_NAME, Journal
-from cmpdesign.evaluate.simulated.sensor import load_sensor
+from cmpdesign.evaluation.journal import JOURNAL_NAME, Journal
+from cmpdesign.evaluation.simulated.sensor import load_sensor
 from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files
 from cmpdesign.files.images import read_image
 from cmpdesign.files.resolution import resolution_dpi

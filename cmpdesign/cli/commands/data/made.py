@@ -9,7 +9,7 @@ from cmpdesign.cli.terminal import finish, print_warning, printable_path, say
 
 if TYPE_CHECKING:
     from cmpdesign.data.folder import Progress
-    from cmpdesign.data.integrity import Checked
+    from cmpdesign.data.integrity import CheckedDataSet
 
 
 def print_made(folder: Path, made: Progress) -> None:
@@ -34,7 +34,7 @@ def print_made(folder: Path, made: Progress) -> None:
     )
 
 
-def print_checked(folder: str, checked: Checked) -> None:
+def print_checked(folder: str, checked: CheckedDataSet) -> None:
     """Print the result of a check, and end the command: with exit code 1 if a file is damaged."""
     from cmpdesign.documents.data import DatasetCheckDocument
 

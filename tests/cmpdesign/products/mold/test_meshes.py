@@ -19,7 +19,7 @@ import trimesh
 
 from cmpdesign import build_layout, load
 from cmpdesign.design.templates import templates_folder
-from cmpdesign.products.mesh.picture import ABOVE, BELOW, ViewDirection, draw_meshes
+from cmpdesign.products.mesh.picture import ABOVE, BELOW, PictureDirection, draw_meshes
 from cmpdesign.products.mesh.three_mf import meshes_to_3mf, read_3mf
 from cmpdesign.products.mesh.triangle_mesh import TriangleMesh
 from cmpdesign.products.mold import meshes as product
@@ -270,7 +270,7 @@ def test_a_steep_face_is_drawn_in_its_shade_not_as_an_outline(run: float) -> Non
     """Its depth changes by ``run`` pixels from one pixel to the next."""
     corners = np.array([(0, 0, 0), (0, 10, 0), (-10 * run, 10, 10), (-10 * run, 0, 10)], dtype=float)
     face = TriangleMesh("face", "#ffffff", corners, np.array([(0, 1, 2), (0, 2, 3)]))
-    picture = draw_meshes([face], ViewDirection(0.0, 0.0), (100, 100)).astype(float)
+    picture = draw_meshes([face], PictureDirection(0.0, 0.0), (100, 100)).astype(float)
     inside = picture[10:90, 10:90, 0]
     assert np.ptp(inside) == 0
     # An edge before something far behind it is still outlined.

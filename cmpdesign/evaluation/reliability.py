@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate import article_results as article
-from cmpdesign.evaluate.report.statistics import SuccessShare, sample_statistics
-from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
-from cmpdesign.evaluate.simulated.contacts import ContactLoad, PlacedSurface, place_surface
-from cmpdesign.evaluate.simulated.instrument import Instrument, instrument_for_method
+from cmpdesign.evaluation import article_results as article
+from cmpdesign.evaluation.report.statistics import SuccessShare, sample_statistics
+from cmpdesign.evaluation.runner import RunOptions, Trial, trial_rng
+from cmpdesign.evaluation.simulated.contacts import ContactLoad, PlacedSurface, place_surface
+from cmpdesign.evaluation.simulated.instrument import Instrument, instrument_for_method
 
 if TYPE_CHECKING:
-    from cmpdesign.evaluate.simulated.conditions import ImagingConditions
+    from cmpdesign.evaluation.simulated.conditions import ImagingConditions
     from cmpdesign.scene import Rendered
     from cmpdesign.scene.truth import Truth
     from extractor import Markers
@@ -61,7 +61,7 @@ def trials(options: RunOptions) -> list[Trial]:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The judged readings of one contact by all methods."""
-    from cmpdesign.evaluate.simulated.conditions import sample_conditions
+    from cmpdesign.evaluation.simulated.conditions import sample_conditions
     from extractor.result import Status
 
     text, mode = values["sensor"], values["mode"]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.square.quads import Quads, find_quads
+from cmpdesign.evaluation.square.quads import Quads, find_quads
 from cmpdesign.layout.layout import Layout
 from cmpdesign.libraries import extra
 from extractor.image.response import Response, light_of_values

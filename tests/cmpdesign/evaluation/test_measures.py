@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmpdesign.evaluate.article_results import change_percent
-from cmpdesign.evaluate.measures.edge_points import (
+from cmpdesign.evaluation.article_results import change_percent
+from cmpdesign.evaluation.measures.edge_points import (
     circumscribed_square_mm,
     edge_points,
     mean_extent_mm,
     shear_response,
 )
-from cmpdesign.evaluate.report.statistics import (
+from cmpdesign.evaluation.report.statistics import (
     SuccessShare,
     round_for_json,
     sample_statistics,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.square.contour_reader import Gray, SquareReader, gray_light, refine_corners
+from cmpdesign.evaluation.square.contour_reader import Gray, SquareReader, gray_light, refine_corners
 from cmpdesign.libraries import extra
 
 Points = NDArray[np.float64]

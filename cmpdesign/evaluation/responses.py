@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate import article_results as article
-from cmpdesign.evaluate.measures import pressed_cube as cube
-from cmpdesign.evaluate.precision import cube_trials
-from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
-from cmpdesign.evaluate.runner import RunOptions, Trial
+from cmpdesign.evaluation import article_results as article
+from cmpdesign.evaluation.measures import pressed_cube as cube
+from cmpdesign.evaluation.precision import cube_trials
+from cmpdesign.evaluation.report.statistics import round_for_json, sample_statistics
+from cmpdesign.evaluation.runner import RunOptions, Trial
 
 METHODS = cube.COMPARED_METHODS
 CASES = {"shear_x": "press_shear_x", "shear_y": "press_shear"}

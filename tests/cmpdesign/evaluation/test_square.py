@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from cmpdesign.evaluate.square.contour_reader import SquareReader, join_corners
-from cmpdesign.evaluate.square.quads import find_quads
-from cmpdesign.evaluate.square.saddle_reader import SaddleReader
+from cmpdesign.evaluation.square.contour_reader import SquareReader, join_corners
+from cmpdesign.evaluation.square.quads import find_quads
+from cmpdesign.evaluation.square.saddle_reader import SaddleReader
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Blob, Camera, Damage, Light, Optics, Scene, Sensor, Truth, Twist, composed, render
 from tests.support.layouts import small_layout

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.simulated.sensor import parse_sensor
+from cmpdesign.evaluation.simulated.sensor import parse_sensor
 
 if TYPE_CHECKING:
     from cmpdesign.contact import Contact, Indenter, Motion

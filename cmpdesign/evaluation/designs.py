@@ -10,12 +10,12 @@ from typing import Any
 
 from cmpdesign.design.design import Design
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.precision import MEASURES
-from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
-from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
-from cmpdesign.evaluate.simulated.contacts import ContactLoad, place_surface
-from cmpdesign.evaluate.simulated.instrument import Instrument, instrument_for_design
-from cmpdesign.evaluate.simulated.sensor import parse_sensor
+from cmpdesign.evaluation.precision import MEASURES
+from cmpdesign.evaluation.report.statistics import round_for_json, sample_statistics
+from cmpdesign.evaluation.runner import RunOptions, Trial, trial_rng
+from cmpdesign.evaluation.simulated.contacts import ContactLoad, place_surface
+from cmpdesign.evaluation.simulated.instrument import Instrument, instrument_for_design
+from cmpdesign.evaluation.simulated.sensor import parse_sensor
 
 CONTACT_REACH_MM = 4.0  # largest distance of a contact from the pattern's middle, in x and y
 
@@ -69,8 +69,8 @@ def _instrument(sensor_text: str, design_text: str, preset: str) -> Instrument:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The errors of one design under one contact; position and light are the same for all designs."""
-    from cmpdesign.evaluate.measures.surface_errors import measure_reconstruction
-    from cmpdesign.evaluate.simulated.conditions import sample_conditions
+    from cmpdesign.evaluation.measures.surface_errors import measure_reconstruction
+    from cmpdesign.evaluation.simulated.conditions import sample_conditions
 
     instrument = _instrument(values["sensor"], values["design"], values["preset"])
     load = instrument.sensor.table.load[values["load"]]

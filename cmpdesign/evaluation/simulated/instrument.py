@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.design.design import Design
-from cmpdesign.evaluate.simulated.conditions import ImagingConditions, mean_conditions
-from cmpdesign.evaluate.simulated.sensor import SimulatedSensor, parse_sensor
+from cmpdesign.evaluation.simulated.conditions import ImagingConditions, mean_conditions
+from cmpdesign.evaluation.simulated.sensor import SimulatedSensor, parse_sensor
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
 
@@ -138,8 +138,8 @@ class Instrument:
 
 def _make_square_reader(instrument: Instrument, view: View) -> Callable[[NDArray[Any]], Markers]:
     """A square pattern's reader for one view; the direction of the rows is known from the picture at rest."""
-    from cmpdesign.evaluate.square.contour_reader import SquareReader
-    from cmpdesign.evaluate.square.saddle_reader import SaddleReader
+    from cmpdesign.evaluation.square.contour_reader import SquareReader
+    from cmpdesign.evaluation.square.saddle_reader import SaddleReader
 
     step_mm = instrument.pitch_mm
     cross = np.array([[0, 0, 0], [step_mm, 0, 0], [0, -step_mm, 0]])

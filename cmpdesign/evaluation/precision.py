@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate import article_results as article
-from cmpdesign.evaluate.measures import pressed_cube as cube
-from cmpdesign.evaluate.report.statistics import round_for_json, sample_statistics
-from cmpdesign.evaluate.runner import RunOptions, Trial, trial_rng
-from cmpdesign.evaluate.simulated.contacts import REST, ContactLoad, place_surface
+from cmpdesign.evaluation import article_results as article
+from cmpdesign.evaluation.measures import pressed_cube as cube
+from cmpdesign.evaluation.report.statistics import round_for_json, sample_statistics
+from cmpdesign.evaluation.runner import RunOptions, Trial, trial_rng
+from cmpdesign.evaluation.simulated.contacts import REST, ContactLoad, place_surface
 
 OBJECTS = (REST, "ball", "ring", "cylinder", "rib", "wedge")
 PRESS_MM, REACH_MM = 2.0, 4.0  # press, and largest distance from the pattern's middle in x and y
@@ -45,9 +45,9 @@ def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The errors of both patterns for one object or cube at one position."""
     if "mode" in values:
         return cube.work(values)
-    from cmpdesign.evaluate.measures.surface_errors import measure_reconstruction
-    from cmpdesign.evaluate.simulated.conditions import mean_conditions
-    from cmpdesign.evaluate.simulated.instrument import instrument_for_method
+    from cmpdesign.evaluation.measures.surface_errors import measure_reconstruction
+    from cmpdesign.evaluation.simulated.conditions import mean_conditions
+    from cmpdesign.evaluation.simulated.instrument import instrument_for_method
 
     text = values["sensor"]
     rng = trial_rng(values["seed"], values["object"], values["index"])

@@ -6,13 +6,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cmpdesign.evaluate.report.page import MANY_COLUMNS, Section, Table, report_html
+from cmpdesign.evaluation.report.page import MANY_COLUMNS, ReportTable, Section, report_html
 
 
 @pytest.mark.parametrize("columns", [2, MANY_COLUMNS, MANY_COLUMNS + 1, 30])
 def test_a_table_cannot_run_beyond_its_page(columns: int) -> None:
     """Every table is in a box that scrolls; long names may wrap; tables of many columns have a smaller font."""
-    table = Table(
+    table = ReportTable(
         "caption", [f"h{i}" for i in range(columns)], [["a-very-long-name " * 3, *["1"] * (columns - 1)]]
     )
     html = report_html("title", [Section("one", tables=[table])])

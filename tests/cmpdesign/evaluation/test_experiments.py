@@ -13,12 +13,12 @@ import pytest
 from typer.testing import CliRunner
 
 from cmpdesign.cli import app
-from cmpdesign.evaluate.measures.pressed_cube import CUBE_POSITIONS_MM, CUBE_SIDE_MM
-from cmpdesign.evaluate.reliability import METHODS, is_successful, judge_places
-from cmpdesign.evaluate.simulated.conditions import mean_conditions, sample_conditions
-from cmpdesign.evaluate.simulated.contacts import ContactLoad, PlacedSurface, place_surface
-from cmpdesign.evaluate.simulated.instrument import instrument_for_method
-from cmpdesign.evaluate.simulated.sensor import SensorError, load_sensor, parse_sensor
+from cmpdesign.evaluation.measures.pressed_cube import CUBE_POSITIONS_MM, CUBE_SIDE_MM
+from cmpdesign.evaluation.reliability import METHODS, is_successful, judge_places
+from cmpdesign.evaluation.simulated.conditions import mean_conditions, sample_conditions
+from cmpdesign.evaluation.simulated.contacts import ContactLoad, PlacedSurface, place_surface
+from cmpdesign.evaluation.simulated.instrument import instrument_for_method
+from cmpdesign.evaluation.simulated.sensor import SensorError, load_sensor, parse_sensor
 from tests.support.sensors import small_sensor_text
 
 
@@ -163,7 +163,7 @@ def test_designs(sensor_file: Path, tmp_path: Path) -> None:
 
 
 def test_angles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmpdesign.evaluate.angles.EDGE_LENGTHS_PX", (30,))
+    monkeypatch.setattr("cmpdesign.evaluation.angles.EDGE_LENGTHS_PX", (30,))
     evaluate("angles", "-o", tmp_path, "--workers", 1)
     cells = report(tmp_path)["cells"]
     assert [cells[f"n{n}"]["shape_change_deg"]["formula"] for n in (3, 4, 6)] == [120, 90, 60]

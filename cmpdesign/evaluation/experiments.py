@@ -10,10 +10,10 @@ from typing import Any
 
 from cmpdesign import __version__
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.designs import DesignEntry
-from cmpdesign.evaluate.journal import Journal
-from cmpdesign.evaluate.report.page import Section, report_html
-from cmpdesign.evaluate.runner import RunOptions, Trial, Work, run_trials
+from cmpdesign.evaluation.designs import DesignEntry
+from cmpdesign.evaluation.journal import Journal
+from cmpdesign.evaluation.report.page import Section, report_html
+from cmpdesign.evaluation.runner import RunOptions, Trial, Work, run_trials
 from cmpdesign.libraries import require_libraries
 
 Figures = Callable[[Sequence[Trial], Sequence[Mapping[str, Any]]], dict[str, Any]]
@@ -46,8 +46,8 @@ def find_experiment(name: str, designs: Sequence[DesignEntry] = ()) -> Experimen
     Raises:
         CmpDesignError: the name is unknown.
     """
-    from cmpdesign.evaluate import angles, precision, reliability, responses, sections
-    from cmpdesign.evaluate import designs as comparison
+    from cmpdesign.evaluation import angles, precision, reliability, responses, sections
+    from cmpdesign.evaluation import designs as comparison
 
     def make(
         title: str, module: Any, page_sections: Callable[[Mapping[str, Any]], list[Section]]

@@ -23,7 +23,7 @@ caption, figcaption { color: #5a646c; text-align: left; font-size: .9rem; }
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """Rows of cells under headings; cells are escaped texts."""
 
     caption: str
@@ -46,7 +46,7 @@ class Section:
     title: str
     paragraphs: Sequence[str] = ()
     points: Sequence[str] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[ReportTable] = ()
     plots: Sequence[Plot] = field(default_factory=tuple)
 
 
@@ -72,7 +72,7 @@ def _section_html(section: Section) -> str:
     return "\n".join(parts)
 
 
-def _table_html(table: Table) -> str:
+def _table_html(table: ReportTable) -> str:
     head = "".join(f"<th>{escape(text)}</th>" for text in table.headings)
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows

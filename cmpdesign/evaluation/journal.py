@@ -27,7 +27,7 @@ HASHED_PACKAGES = (
     "extractor",
     "extractor._native",
     "cmpdesign._native",
-    "cmpdesign.evaluate",
+    "cmpdesign.evaluation",
     "cmpdesign.scene",
     "cmpdesign.contact",
     "cmpdesign.patterns",

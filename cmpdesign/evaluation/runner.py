@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.evaluate.journal import Journal
+from cmpdesign.evaluation.journal import Journal
 from cmpdesign.libraries import extra
 from cmpdesign.watch import tell
 from cmpdesign.workers import worker_pool

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate.reliability import METHODS
-from cmpdesign.evaluate.report import plots
-from cmpdesign.evaluate.report.page import Plot, Section, Table
+from cmpdesign.evaluation.reliability import METHODS
+from cmpdesign.evaluation.report import plots
+from cmpdesign.evaluation.report.page import Plot, ReportTable, Section
 
 Document = Mapping[str, Any]
 
@@ -81,7 +81,7 @@ def reliability_sections(document: Document) -> list[Section]:
         for mode, methods in modes.items()
         for method, entry in methods.items()
     ]
-    table = Table(
+    table = ReportTable(
         "Successful trials; 95 % intervals after Wilson.",
         (
             "mode: method",
@@ -169,7 +169,7 @@ def _change_rows(cases: Document) -> list[Sequence[str]]:
 
 def _edge_section(edges: Document) -> Section:
     rows = _change_rows({MODES[mode]: entry for mode, entry in edges.items()})
-    table = Table(
+    table = ReportTable(
         "Edge fitting error, mm: difference of the fitted square's side and 15 mm, mean over the places.",
         ("mode", "square", "multicolor", "change", "the article"),
         rows,
@@ -236,7 +236,7 @@ def _shape_section(document: Document) -> Section:
         "area covered",
         "markers measured",
     )
-    table = Table("Errors in micrometres, means over the places.", headings, rows)
+    table = ReportTable("Errors in micrometres, means over the places.", headings, rows)
     errors = {
         name: {method: _to_um(entry["surface_rms_mm"]["mean"]) for method, entry in methods.items()}
         for name, methods in shapes.items()
@@ -266,7 +266,7 @@ def _format_whole_percent(share: float | None) -> str:
 def response_sections(document: Document) -> list[Section]:
     """The page of ``evaluate response``."""
     rows = _change_rows({case.replace("_", " "): entry for case, entry in document["response"].items()})
-    table = Table(
+    table = ReportTable(
         "Mean displacement of the edge points over the shear of 1 mm.",
         ("direction", "square", "multicolor", "change", "the article"),
         rows,
@@ -312,7 +312,7 @@ def angle_sections(document: Document) -> list[Section]:
             ]
             for n in measured
         ]
-        table = Table(
+        table = ReportTable(
             "The first angle lost, in degrees.", ("cell", equation, *(f"{size} px" for size in sizes)), rows
         )
         plot = Plot("First angle lost; dashed: the formula.", plots.plot_lost_angles(measured, formula))
@@ -374,7 +374,7 @@ def design_sections(document: Document) -> list[Section]:
                 "covered only. "
                 "Pictures without a reading count as 0 % covered and measured, and not in the errors."
             ],
-            tables=[Table("Means over all contacts and places.", headings, rows)],
+            tables=[ReportTable("Means over all contacts and places.", headings, rows)],
             plots=[Plot("Error against density.", plots.plot_error_over_density(points))],
         ),
     ]

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.simulated.conditions import ImagingConditions
-from cmpdesign.evaluate.simulated.contacts import PlacedSurface
-from cmpdesign.evaluate.simulated.instrument import Instrument
+from cmpdesign.evaluation.simulated.conditions import ImagingConditions
+from cmpdesign.evaluation.simulated.contacts import PlacedSurface
+from cmpdesign.evaluation.simulated.instrument import Instrument
 from extractor.errors import PoseError
 
 Points = NDArray[np.float64]

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.evaluate.measures.edge_points import (
+from cmpdesign.evaluation.measures.edge_points import (
     circumscribed_square_mm,
     edge_points,
     mean_extent_mm,
     shear_response,
 )
-from cmpdesign.evaluate.runner import trial_rng
-from cmpdesign.evaluate.simulated.contacts import ContactLoad, PlacedSurface, place_surface
-from cmpdesign.evaluate.simulated.instrument import Instrument, instrument_for_method
+from cmpdesign.evaluation.runner import trial_rng
+from cmpdesign.evaluation.simulated.contacts import ContactLoad, PlacedSurface, place_surface
+from cmpdesign.evaluation.simulated.instrument import Instrument, instrument_for_method
 
 Points = NDArray[np.float64]
 CUBE_SIDE_MM, SHEAR_MM = 15.0, 1.0
@@ -61,7 +61,7 @@ def cube_turn_deg(mode: str, index: int, seed: int) -> float:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The measures of each pattern for the cube at one position."""
-    from cmpdesign.evaluate.simulated.conditions import mean_conditions
+    from cmpdesign.evaluation.simulated.conditions import mean_conditions
 
     text, mode = values["sensor"], values["mode"]
     centre_mm = cube_position_mm(values["index"], values["seed"])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmpdesign.evaluate import angles
-from cmpdesign.evaluate.measures.single_cells import (
+from cmpdesign.evaluation import angles
+from cmpdesign.evaluation.measures.single_cells import (
     bend_corner,
     draw_cell,
     find_cell_corners,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from cmpdesign.evaluate.runner import RunOptions, Trial
+from cmpdesign.evaluation.runner import RunOptions, Trial
 
 RECOGNITION_RULE = (
     "A cell is recognised when the n most prominent corners of its contour are convex, each by at least 1.5 px, "
@@ -38,7 +38,7 @@ def trials(options: RunOptions) -> list[Trial]:
 
 def work(values: Mapping[str, Any]) -> dict[str, Any]:
     """The first angle, in steps of ``STEP_DEG``, at which a cell is lost."""
-    from cmpdesign.evaluate.measures.single_cells import is_numbering_kept, is_shape_recognised
+    from cmpdesign.evaluation.measures.single_cells import is_numbering_kept, is_shape_recognised
 
     holds, limit = (
         (is_shape_recognised, change_limit_deg)

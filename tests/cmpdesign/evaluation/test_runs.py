@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.evaluate import journal
-from cmpdesign.evaluate.journal import JOURNAL_NAME, Journal, fingerprint
-from cmpdesign.evaluate.runner import RunOptions, Trial, run_trials, trial_rng
+from cmpdesign.evaluation import journal
+from cmpdesign.evaluation.journal import JOURNAL_NAME, Journal, fingerprint
+from cmpdesign.evaluation.runner import RunOptions, Trial, run_trials, trial_rng
 
 CONDITIONS = {"experiment": "test", "seed": 3}
 TRIALS = [Trial(f"draw-{i}", {"seed": 3, "index": i}) for i in range(6)]
