@@ -36,8 +36,8 @@ class RowBreakLimits(NamedTuple):
         most_of_layout: a third of the layout's own third difference, for a gridline to count. Chosen: a tilted view
             maps it a tenth wrong.
         min_rise: of a gridline across the rows, to count. Chosen.
-        max_deviation: of the four markers of a gridline, in its edges, to count: dirt moves uncertain markers by as much
-            as a tear. Chosen.
+        max_deviation: of the four markers of a gridline, to count: dirt moves uncertain markers as far as a tear does.
+            Chosen.
         min_jump: of a strip, for a break. Chosen: 0.4 px where an edge has 20.
         ratio: of the largest jump along rows and that along columns. Chosen: pressed and twisted patterns have less
             than 2.

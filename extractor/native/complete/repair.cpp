@@ -54,8 +54,8 @@ double variance_by_neighbours(Index m, const MarkerPredictions& rings, double se
       !(leverage < limits.max_leverage && upper_bound < square(limits.max_repaired_deviation * edge_px)))
     return NOT_A_NUMBER;
   const double departure = std::max(variance - rings.neighbour_noise_px2[m], 0.0);
-  const double found = rings.noise_px2[m] +
-                       std::max(square(limits.mild_error * leverage) * departure, seen * (1 + leverage));
+  const double found =
+      rings.noise_px2[m] + std::max(square(limits.mild_error * leverage) * departure, seen * (1 + leverage));
   return found < square(limits.max_repaired_deviation * edge_px) ? found : NOT_A_NUMBER;
 }
 

@@ -91,9 +91,7 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
     const auto strip = static_cast<std::size_t>(line.middle[axis] / (limits.bin * edge));
     if (strip >= end.size()) end.resize(strip + 1);
     ++end[strip];
-    const auto jump = [&](int k) {
-      return std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge);
-    };
+    const auto jump = [&](int k) { return std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge); };
     crossings.push_back({strip, {jump(0), jump(1)}});
   }
   std::partial_sum(end.begin(), end.end(), end.begin());
