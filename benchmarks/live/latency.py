@@ -23,12 +23,12 @@ from typing import Any
 
 import cv2
 import numpy as np
+from benchmarks.support.machine import conditions_text, write_json
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
 import cmpdesign
-from benchmarks.support.machine import conditions_text, write_json
 from benchmarks.support.timed_camera import TimedCamera, in_the_place_of_opencv
 from cmpdesign.scene import Press, render, standard_layout, standard_scene
 
