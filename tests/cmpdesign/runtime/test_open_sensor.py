@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import cmpdesign
-from benchmarks.support.timed_camera import Fault, TimedCamera, in_the_place_of_opencv
+from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_opencv
 from cmpdesign.runtime.events import EventKind
 from cmpdesign.runtime.sensor import LateError
 from cmpdesign.runtime.zero import TouchedError
