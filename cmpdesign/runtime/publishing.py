@@ -26,7 +26,7 @@ def times_of_this_machine() -> SourceTimes:
     return SourceTimes("camera", "times: middle of the exposure", began_s, "clock")
 
 
-class SensorTable:
+class ResultsTable:
     """The table of a sensor's results; its shared columns are those of the present rest frame.
 
     Args:
@@ -74,7 +74,7 @@ class SensorRecorder:
         """A result as a frame; None where no view could be placed yet."""
         if frame.tracked is None:
             return None
-        self._table = self._table or RecordedTable(SensorTable(self._sensor), self._recording)
+        self._table = self._table or RecordedTable(ResultsTable(self._sensor), self._recording)
         columns, about = self._table.batch([frame.tracked]), self._table.about()
         (found,) = self._reader.frames(columns, about, lambda number, view: None)
         events = "; ".join(map(str, frame.events))
