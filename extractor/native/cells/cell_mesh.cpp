@@ -163,8 +163,8 @@ double swelling_of(const Triangles& triangles, const MutualContacts& contacts, I
 
 }  // namespace
 
-CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
-                     const CellMeshLimits& limits) {
+CellMesh link_cells(View<const double, 2> center, View<const double, 3> corner,
+                    const CellMeshLimits& limits) {
   const Index count = center.size();
   Array<std::int32_t, 2> neighbours({count, STEPS}, -1);
   Array<std::int8_t, 2> back({count, STEPS}, std::int8_t{-1});
@@ -186,7 +186,7 @@ CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
         misfit(i, k) = mutual.misfit(i, k);
       }
   }
-  return {std::move(neighbours), std::move(back), std::move(misfit), swelling};
+  return {{std::move(neighbours), std::move(back), std::move(misfit)}, swelling};
 }
 
 }  // namespace cmp::cells

@@ -23,10 +23,7 @@ struct CellLinks {
   View<const std::int8_t, 2> back;         // (N, 6)
   View<const double, 2> misfit;            // (N, 6)
 
-  template <class F>
-  static CellLinks read(const F& f) {
-    return {f["neighbours"], f["back"], f["misfit"]};
-  }
+  CMP_FIELDS(neighbours, back, misfit)
 };
 
 // (N, 2) axial coordinates of the cells, (N,) the corner that is corner 0, (N,) the part, or -1 for a cell
