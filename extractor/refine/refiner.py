@@ -31,6 +31,7 @@ from extractor.refine.estimate import (
     places_in_view,
 )
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
+from extractor.refine.measure.dot_gain import markers_without_dot_gain
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
 from extractor.refine.measure.gridline_weights import short_edge
 from extractor.refine.outliers import correct_outliers
@@ -43,7 +44,6 @@ from extractor.refine.refinement_step import (
 )
 from extractor.refine.relief import find_parallax, without_parallax
 from extractor.refine.solve.fisher_information import Information
-from extractor.refine.measure.dot_gain import markers_without_dot_gain
 from extractor.refine.synthesis_steps import SynthesisSolver
 
 SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first. Chosen
