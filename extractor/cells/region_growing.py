@@ -40,5 +40,5 @@ def grow(view: PyramidLevel, cells: Cells) -> Regions:
     seed = np.clip(np.rint(view.to_level(cells.center_px)), 0, (width - 1, height - 1)).astype(np.int32)
     limit_px = np.maximum(MAX_GROWN_AREA * cells.area_px / view.scale**2, 1).astype(np.int64)
     hsv = cv2.cvtColor(view.image, cv2.COLOR_BGR2HSV)
-    framed, moments = native.grow(hsv, seed, limit_px)
+    framed, moments = native.grow(np.asarray(hsv, np.uint8), seed, limit_px)
     return Regions(region_map=framed[1:-1, 1:-1], seed=seed, moments=moments)

@@ -30,14 +30,11 @@ struct CellLinks {
   CMP_RECORD("extractor.cells.cell_mesh.CellLinks", neighbours, back, misfit)
 };
 
-struct CellMesh {
-  CellLinks links;
-  double swelling;  // sides of the triangles over those at which neighbours just meet
-
-  CMP_RECORD("extractor.cells.cell_mesh.CellMesh", links, swelling)
-};
+// The links; the swelling: sides of the triangles over those at which neighbours just meet.
+using LinkedCells = std::tuple<CellLinks, double>;
 
 // center (N, 2), corner (N, 3, 2) clockwise in the image.
-CellMesh link_cells(View<const double, 2> center, View<const double, 3> corner, const CellMeshLimits& limits);
+LinkedCells link_cells(View<const double, 2> center, View<const double, 3> corner,
+                       const CellMeshLimits& limits);
 
 }  // namespace cmp::cells
