@@ -23,7 +23,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.support.code_copy import PACKAGES, ROOT, CodeCopy, Replacement
+from benchmarks.suites.code_copy import PACKAGES, ROOT, CodeCopy, Replacement
 from tests.house.cpp_text import definitions
 
 SWAPPED: dict[type, type] = {

@@ -7,8 +7,6 @@ drawn, gives the gridline's offset.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,19 +14,7 @@ from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
 from extractor.refine.measure.marker_scatter import MarkerScatter
-
-
-class VirtualMarkers(NamedTuple):
-    """m virtual markers on each of E edges.
-
-    Attributes:
-        xy_px, cov_px2: (E, m, 2) and (E, m, 2, 2) float64, NaN where lost.
-        status: (E, m) uint8, a ``VirtualStatus`` each.
-    """
-
-    xy_px: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
-    status: NDArray[np.uint8]
+from extractor.result import VirtualMarkers
 
 
 def locate_virtual_markers(

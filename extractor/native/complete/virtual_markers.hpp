@@ -36,7 +36,7 @@ struct VirtualMarkers {
   Array<double, 4> cov_px2;       // (E, m, 2, 2)
   Array<std::uint8_t, 2> status;  // (E, m)
 
-  CMP_RECORD("extractor.complete.virtual_markers.VirtualMarkers", xy_px, cov_px2, status)
+  CMP_RECORD("extractor.result.VirtualMarkers", xy_px, cov_px2, status)
 };
 
 // The m virtual markers on each of E edges.

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.suites.calibration.plain import scattered_layout
+from benchmarks.suites.scenes import SceneCase, cached_extractor
 from benchmarks.suites.scoring.calibration import squared_distances, summarise
-from benchmarks.support.scenes import SceneCase, cached_extractor
 from cmpdesign.scene import render
 from extractor import Status, VirtualStatus, parse_layout
 from extractor.layout.topology import Topology, topology_of
