@@ -43,6 +43,7 @@ class Sensor:
     Attributes:
         name: of the sensor.
         plan: as given.
+        tracker: reads the frames; made of the first frame, and again by ``zero``.
         count: number of results so far.
     """
 
@@ -51,7 +52,7 @@ class Sensor:
         self._log, self._changed = EventLog(), Condition()
         self._results: deque[SensorFrame] = deque(maxlen=KEPT_RESULTS)
         self._timings: deque[Timing] = deque(maxlen=FRAMES)
-        self._tracker: Tracker | ContactTracker | ShapeTracker | None = None
+        self.tracker: Tracker | ContactTracker | ShapeTracker | None = None
         self._rest: tuple[Markers, ...] | None = None
         self._closing, self._failure = Event(), ""
         table, self._cameras = plan.file.table, list[Camera]()
@@ -138,7 +139,7 @@ class Sensor:
         before = self._rest if check else None
         rest = rest_markers(frames, before, self.plan.layout, self.plan.file.table.limits.max_rest_error_px)
         tracker = self.plan.tracker(rest)
-        self._rest, self._tracker = rest, tracker
+        self._rest, self.tracker = rest, tracker
 
     def close(self) -> None:
         """End all threads; a driver that does not return is left alone."""
@@ -203,11 +204,11 @@ class Sensor:
         first, images = frames[0], [one.image for one in frames]
         image: Any = images[0] if len(images) == 1 else images
         problem = "; ".join(filter(None, (one.problem for one in frames)))
-        if self._tracker is None and all(one is not None for one in images):
-            self._tracker = self.plan.first_tracker(image)
+        if self.tracker is None and all(one is not None for one in images):
+            self.tracker = self.plan.first_tracker(image)
         tracked = None
-        if self._tracker is not None:
-            tracked = self._tracker.track(image, time_s=first.taken_s, reason=problem)
+        if self.tracker is not None:
+            tracked = self.tracker.track(image, time_s=first.taken_s, reason=problem)
         now_s = time.monotonic()
         result = SensorFrame(
             name=self.name,

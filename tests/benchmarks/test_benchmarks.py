@@ -37,6 +37,7 @@ ROOT = Path(__file__).parents[2]
         ("startup", set()),
         ("rendering", set()),
         ("contact", set()),
+        ("latency", {"seconds"}),
         ("medium", set()),
         ("datasets", {"rates", "bytes", "overheads"}),
         ("extraction", {"presets", "large", "over_pixels", "over_markers", "growth"}),

@@ -110,6 +110,10 @@ class OpenedCamera:
         self._is_released = True
 
 
-def in_the_place_of_opencv(cameras: dict[int, TimedCamera]) -> Callable[[int, int], OpenedCamera]:
+def in_the_place_of_opencv(cameras: dict[int, TimedCamera]) -> Callable[..., OpenedCamera]:
     """What stands for ``cv2.VideoCapture``: opens these cameras by their numbers."""
-    return lambda number, backend=0: OpenedCamera(cameras.get(number))
+
+    def opened(number: int, backend: int = 0) -> OpenedCamera:
+        return OpenedCamera(cameras.get(number))
+
+    return opened
