@@ -24,7 +24,7 @@ _LOOK_S = 0.2
 def serve(
     sensors: Annotated[
         list[Path],
-        typer.Argument(metavar="SENSOR...", help="Sensor files with a [camera].", show_default=False),
+        typer.Argument(metavar="SENSOR", help="Sensor files with a [camera].", show_default=False),
     ],
     output: Annotated[
         list[str] | None,
