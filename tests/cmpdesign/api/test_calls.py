@@ -23,7 +23,7 @@ from extractor import Extractor, LayoutError, Tracker
 from tests.support.command import commands, run
 
 ROOT = Path(__file__).parents[3]
-NOT_CALLS = {"studio", "view"}  # of a page
+NOT_CALLS = {"serve", "studio", "view"}  # `open_sensor` for viewers; of a page
 
 
 @pytest.fixture(scope="module")
