@@ -87,7 +87,7 @@ def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
     for heading in ("field", "power", "speed", *(f"{count} x" for count in counts), "depth a pass"):
         table.add_column(heading, justify="left" if heading == "field" else "right")
     for one in reading.fields:
-        windows = [one.states[count] for count in counts]
+        windows = [_window_text(one, count) for count in counts]
         settings = (f"{one.power_percent:g} %", f"{one.speed_mm_s:g} mm/s")
         table.add_row(one.name, *settings, *windows, _depth_text(one.depth_per_pass_mm))
     say(table)
@@ -101,11 +101,18 @@ def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
     finish(lambda: GridDocument.model_validate(_grid_to_json(reading)))
 
 
-def _depth_text(depth: tuple[float, float] | None) -> str:
-    if depth is None:
-        return "not through"
+def _window_text(one: FieldReading, count: int) -> str:
+    if one.states[count] != "marked":
+        return one.states[count]
+    low, high = one.depths_mm[count]
+    return f"{low:.2g} to {high:.2g} mm" if low else f"to {high:.2g} mm"
+
+
+def _depth_text(depth: tuple[float, float]) -> str:
     low, high = depth
-    return f"above {low:.3g} mm" if high == float("inf") else f"{low:.3g} to {high:.3g} mm"
+    if high == float("inf"):
+        return f"above {low:.3g} mm"
+    return f"{low:.3g} to {high:.3g} mm" if low else f"below {high:.3g} mm"
 
 
 def _settings_lines(one: FieldReading, photo: str) -> str:
@@ -124,13 +131,14 @@ def _settings_lines(one: FieldReading, photo: str) -> str:
 def _grid_to_json(reading: GridReading) -> dict[str, object]:
     fields = []
     for one in reading.fields:
-        low, high = one.depth_per_pass_mm or (None, None)
+        low, high = one.depth_per_pass_mm
         fields.append(
             {
                 "name": one.name,
                 "power_percent": one.power_percent,
                 "speed_mm_s": one.speed_mm_s,
                 "windows": one.states,
+                "depths_mm": one.depths_mm,
                 "passes": one.passes,
                 "least_depth_per_pass_mm": low,
                 "most_depth_per_pass_mm": None if high == float("inf") else high,
