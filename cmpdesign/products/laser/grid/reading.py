@@ -114,7 +114,7 @@ def read_grid(grid: Coupon, image: Image, response: Response = "srgb") -> GridRe
 
 
 def _with_bounds_of_others(fields: Sequence[FieldReading]) -> tuple[FieldReading, ...]:
-    """A pass burns no deeper than one of at least its power and at most its speed, and no less deep than the reverse."""
+    """A pass burns at most as deep as one of no less power and no more speed, and at least as deep as the reverse."""
     bounded = []
     for one in fields:
         stronger = [each for each in fields if _burns_as_deep(each, one)]
