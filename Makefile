@@ -14,6 +14,9 @@ ifeq ($(shell command -v $(CXX) || command -v g++ || command -v clang++),)
   ZIG := --zig
 endif
 
+# The tests start some hundred programs, each of which would compile its modules again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help setup demo test test-all test-sanitized lint bench figures docs lock wheel clean
 
 help:
