@@ -95,20 +95,25 @@ def _score_assignment(
 
     source = marks[:4].astype(np.float32)
     homography = cv2.getPerspectiveTransform(source, similar[list(four), :2].astype(np.float32))
+    others = [i for i in range(len(similar)) if i not in four]
+    fifth = _project_points(homography, marks[4:])
+    if not others or not np.isfinite(fifth).all():
+        return None
+    # most assignments fail here, so that the places of the rims come later
+    distance = np.linalg.norm(np.subtract(similar[others, :2], fifth), axis=1)
+    five = similar[[*four, others[int(distance.argmin())]]]
+    diameter = np.sqrt(4 * five[:, 2] / np.pi)
+    fifth_error = float(distance.min()) / float(diameter[4])
+    if fifth_error > MAX_FIFTH_MARK_ERROR:
+        return None
     compass = diameter_mm / 2 * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
     rims = _project_points(homography, (marks[:, None] + compass).reshape(-1, 2)).reshape(5, 4, 2)
     width = np.linalg.norm(rims[:, 0] - rims[:, 1], axis=1)
     height = np.linalg.norm(rims[:, 2] - rims[:, 3], axis=1)
-    others = [i for i in range(len(similar)) if i not in four]
-    if not others or not np.isfinite(rims).all() or min(width.min(), height.min()) <= 1:
+    if not np.isfinite(rims).all() or min(width.min(), height.min()) <= 1:
         return None
-    fifth = _project_points(homography, marks[4:])
-    distance = np.linalg.norm(np.subtract(similar[others, :2], fifth), axis=1)
-    five = similar[[*four, others[int(distance.argmin())]]]
-    diameter = np.sqrt(4 * five[:, 2] / np.pi)
     stretch = max(np.abs(np.log(diameter / np.sqrt(width * height)))) + max(np.abs(np.log(width / height)))
-    fifth_error = float(distance.min()) / float(diameter[4])
-    if fifth_error > MAX_FIFTH_MARK_ERROR or stretch > MAX_STRETCH:
+    if stretch > MAX_STRETCH:
         return None
     return float(fifth_error + stretch), five[:, :2]
 
