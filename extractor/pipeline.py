@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from extractor.cells.cell_mesh import CellMesh, build_cell_mesh
 from extractor.cells.cells import EFFORTS, Cells, Effort, find_cells, has_color
 from extractor.cells.region_growing import grow
-from extractor.cells.triangle_fit import fit_edges, regions_as_cells, without_swelling
+from extractor.cells.triangle_fit import fit_edges, regions_as_cells
 from extractor.complete.image_quality import (
     measure_quality,
     measure_quality_without_numbers,
@@ -37,7 +38,7 @@ from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import Reference
 from extractor.layout.topology import topology_of
 from extractor.numbering.ink_fields import Palette
-from extractor.numbering.lattice_walk import Walk, cell_light, count_holes, walk_cells
+from extractor.numbering.lattice_walk import Walk, cell_light, walk_cells
 from extractor.numbering.marker_places import InitialMarkers, merge_corners
 from extractor.numbering.missing_cells import with_missing_cells
 from extractor.numbering.registration import Numbering, Refusal, Registration
@@ -249,8 +250,8 @@ class Extractor:
             quality = measure_quality_without_numbers(pyramid.level(1), found.edge_px)
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
-        (cells, mesh, _, _), numbering = found
-        expected = with_missing_cells(without_swelling(cells, mesh), numbering, self._lattice)
+        (_, mesh, _, _), numbering = found
+        expected = with_missing_cells(mesh.corner_px, numbering, self._lattice)
         triangles = stages.record(
             "triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px))
         )
@@ -281,19 +282,16 @@ class Extractor:
         repaired = repair_markers(refined, places, self._lattice, size)
         rows = find_row_break(self._topology, repaired, size)
         repaired = stages.record("repair", beside_row_break(rows, repaired))
-        located = locate_virtual_markers(self._topology, repaired, refined.points, refined.scatter)
-        virtual = stages.record("virtual", located)
+        virtual = partial(locate_virtual_markers, self._topology, repaired, refined.points, refined.scatter)
         few = is_less_than_half_reported(repaired.xy_px, self.layout.xy_mm, self._lattice.present, size)
         view, cells = pyramid.level(1), self._sampled_cells
         quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined.blur_px)
         quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
-        markers = Markers(
+        markers = Markers.with_later(
+            virtual,
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,
             status=repaired.status,
-            virtual_xy_px=virtual.xy_px,
-            virtual_cov_px2=virtual.cov_px2,
-            virtual_status=virtual.status,
             mirrored=numbered.mirrored,
             origin=numbered.origin,
             reason=Reason.FEW_MARKERS if few else None,
@@ -353,7 +351,7 @@ class Extractor:
 
     def _is_whole(self, found: FoundCells) -> bool:
         """Whether the cells of an image are all found, as far as the cells themselves show it."""
-        return found.linked >= self._registration.min_cells and count_holes(found.walk) <= max(
+        return found.linked >= self._registration.min_cells and found.walk.holes <= max(
             MAX_HOLE_SHARE * found.linked, MIN_HOLES
         )
 
