@@ -1,16 +1,11 @@
 """Ctrl-C while the program starts: what a user sees, by the time of the signal.
 
-    python -m benchmarks.interrupts [--signals N] [--until MS] [--seed N] [--program FILE] [--json FILE]
-
-Starts the installed script ``cmpdesign`` of this environment again and again, sends SIGINT after a processor time that is
-drawn uniformly (on an idle machine this is the time since the start; it does not depend on the load), and counts: one line and exit code 130; ended by the signal before Python takes signals, without a word (the
-shell reports 130); a traceback, of Python's own start or of the installed script.
+Starts the installed script ``cmpdesign`` of this environment again and again, sends SIGINT after a processor time that
+is drawn uniformly (on an idle machine: the time since the start), and counts what comes of it. Needs Linux.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
 import signal
 import subprocess
 import sys
@@ -20,23 +15,29 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.table import TEXT, Table
 
-PROGRAM = Path(sys.executable).with_name("cmpdesign")
-OUTCOMES = ("one line, 130", "ended by the signal", "traceback", "had ended")
+OUTCOMES = (
+    "one line, exit code 130",
+    "ended by the signal, without a word",
+    "traceback of Python's own start",
+    "traceback of the installed script",
+    "had ended",
+)
 POLL_S = 0.0005
 
 
 def processor_s(pid: int) -> float:
-    """Time that a process has run on a processor."""
+    """Time that a process has run on a processor; infinite if it has ended."""
     try:
         return int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[0]) / 1e9
-    except OSError:  # it has ended
+    except OSError:
         return float("inf")
 
 
-def outcome_of(program: Path, delay_s: float) -> tuple[str, str]:
-    """What a signal after this processor time does, and what was printed."""
+def outcome_of(program: Path, delay_s: float) -> str:
+    """What a signal after this processor time does."""
     process = subprocess.Popen(
         [program, "templates"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
@@ -45,41 +46,36 @@ def outcome_of(program: Path, delay_s: float) -> tuple[str, str]:
     process.send_signal(signal.SIGINT)
     _, printed = process.communicate(timeout=60)
     if "Traceback" in printed or "Fatal" in printed:
-        return "traceback", printed
+        return OUTCOMES[2] if "<frozen site>" in printed else OUTCOMES[3]
     if process.returncode == 130 and printed.startswith("error: interrupted") and printed.count("\n") == 1:
-        return "one line, 130", printed
-    if process.returncode == -signal.SIGINT:
-        return "ended by the signal", printed
-    return "had ended", printed
+        return OUTCOMES[0]
+    return OUTCOMES[1] if process.returncode == -signal.SIGINT else OUTCOMES[4]
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Send the signals, print the counts and the tracebacks' last lines."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.interrupts", description=__doc__.split("\n")[0])
-    parser.add_argument("--signals", type=int, default=200)
-    parser.add_argument("--until", type=float, default=250.0, metavar="MS", help="latest time of a signal")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--program", type=Path, default=PROGRAM)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    options = parser.parse_args(arguments)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a program in the background ignores it, as its children do
-    rng = np.random.default_rng(options.seed)
-    counts: Counter[str] = Counter()
-    causes: Counter[str] = Counter()
-    for delay_s in rng.uniform(0, options.until / 1000, options.signals):
-        outcome, printed = outcome_of(options.program, delay_s)
-        counts[outcome] += 1
-        if outcome == "traceback":
-            causes["Python's own start" if "<frozen site>" in printed else "the installed script"] += 1
-    print(f"{options.signals} signals from 0 to {options.until:g} ms after the start, seed {options.seed}")
-    for outcome in OUTCOMES:
-        print(f"{counts[outcome]:5}  {100 * counts[outcome] / options.signals:5.1f} %  {outcome}")
-    print(f"tracebacks: {', '.join(f'{number} of {cause}' for cause, number in causes.most_common()) or 'none'}")
-    print(f"load {os.getloadavg()[0]:.1f}; {conditions_text()}")
-    if options.json:
-        write_json(options.json, {"counts": dict(counts), "seed": options.seed, "until_ms": options.until})
-    return 0
+def measure(signals: int = 200, until_ms: float = 250.0, seed: int = 1, quick: bool = False) -> Shown:
+    """Signals while the program starts.
 
+    Args:
+        signals: starts of the program, one signal each.
+        until_ms: latest time of a signal.
+        seed: of the times.
+        quick: 10 signals.
+    """
+    # a process in the background ignores SIGINT, and so do those that it starts
+    earlier = signal.signal(signal.SIGINT, signal.default_int_handler)
+    delays_s = np.random.default_rng(seed).uniform(0, until_ms / 1000, 10 if quick else signals)
+    program = Path(sys.executable).with_name("cmpdesign")
+    try:
+        counts = Counter(outcome_of(program, float(delay_s)) for delay_s in delays_s)
+    finally:
+        signal.signal(signal.SIGINT, earlier)
+    rows = [(outcome, counts[outcome], 100 * counts[outcome] / len(delays_s)) for outcome in OUTCOMES]
+    columns = {"outcome": TEXT, "signals": "d", "%": ".1f"}
+    yield Table(f"Ctrl-C up to {until_ms:g} ms after the start", columns, rows)
+    return Found()
+
+
+main = Experiment("interrupts", measure)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -35,6 +35,7 @@ ROOT = Path(__file__).parents[2]
     ("name", "keys"),
     [
         ("startup", set()),
+        ("interrupts", set()),
         ("rendering", set()),
         ("contact", set()),
         ("latency", {"seconds"}),

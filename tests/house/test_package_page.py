@@ -46,7 +46,9 @@ def test_the_address_stands_in_one_place() -> None:
 
 def test_the_source_archive_can_make_the_page(tmp_path: Path) -> None:
     """From a copy without what is installed and made, which the builder would walk through."""
-    made = shutil.ignore_patterns(".venv", ".git", "build", "dist", "out", "__pycache__", "docs", "benchmarks")
+    made = shutil.ignore_patterns(
+        ".venv", ".git", "build", "dist", "out", "__pycache__", "docs", "benchmarks"
+    )
     shutil.copytree(ROOT, tmp_path / "copy", ignore=made)
     code = "from scikit_build_core.build import build_sdist; build_sdist('..')"
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path / "copy", capture_output=True, check=True)

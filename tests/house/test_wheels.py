@@ -12,7 +12,6 @@ import sys
 import sysconfig
 import venv
 import zipfile
-from importlib.metadata import version
 from pathlib import Path
 
 import cv2
@@ -96,7 +95,8 @@ def make_arm_root(folder: Path) -> Path:
 
 def add_arm_libraries(wheel: Path, folder: Path) -> None:
     """The wheel, and NumPy and OpenCV of its processor, in a folder."""
-    locked = [f"{name}=={version(name)}" for name in ("numpy", "opencv-contrib-python-headless")]
+    lines = (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines()
+    locked = [line for line in lines if line.startswith(("numpy==", "opencv-"))]
     systems = [f"--platform=manylinux_2_{minor}_aarch64" for minor in (17, 28)]
     words = ["download", "--quiet", "--no-deps", "--only-binary=:all:", "--python-version=3.11", *systems]
     subprocess.run([sys.executable, "-m", "pip", *words, "-d", folder.parent / "wheels", *locked], check=True)

@@ -144,7 +144,9 @@ def test_later_cells_replace_earlier_ones() -> None:
 
 
 def test_a_deviation_names_its_parameter_and_what_cannot_be_read_is_an_error(tmp_path: Path) -> None:
-    result = run("check", "gelsight-mini", "--read", "--set", "laser.face=front", "--set", "sheet.dot_gain_mm=0.06")
+    result = run(
+        "check", "gelsight-mini", "--read", "--set", "laser.face=front", "--set", "sheet.dot_gain_mm=0.06"
+    )
     assert result.exit_code == 0
     text = " ".join(result.stdout.split())
     assert "change laser.face" in text and "sheet.dot_gain_mm" in text

@@ -74,13 +74,39 @@ def _assign_fiducials(candidates: Values, marks: Values, diameter_mm: float) -> 
     best: tuple[float, Values] | None = None
     for start in range(max(len(candidates) - 4, 0)):
         similar = candidates[start:][candidates[start:, 2] > 0.4 * candidates[start, 2]][:MAX_CANDIDATES]
-        for four in permutations(range(len(similar)), 4):
+        for four in _plausible_assignments(similar, marks):
             found = _score_assignment(similar, four, marks, diameter_mm)
             if found is not None and (best is None or found[0] < best[0]):
                 best = found
         if best is not None:
             return best
     return None
+
+
+def _plausible_assignments(similar: Values, marks: Values) -> list[tuple[int, ...]]:
+    """Four candidates for the first four marks, of which the fifth mark's place has another candidate near.
+
+    The homography by determinants: it maps the mark s_i to a multiple of the candidate t_i, in homogeneous coordinates.
+    """
+    fours = np.array(list(permutations(range(len(similar)), 4)))
+    places = np.column_stack([similar[:, :2], np.ones(len(similar))])
+    weights = _shares(np.column_stack([marks[:4], np.ones(4)])[None])[0]
+    fifth = np.linalg.solve(np.column_stack([marks[:3], np.ones(3)]).T, [*marks[4], 1.0])
+    chosen = places[fours]
+    mapped = np.einsum("pi,pij->pj", _shares(chosen) * (fifth / weights), chosen[:, :3])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.linalg.norm(similar[None, :, :2] - (mapped[:, :2] / mapped[:, 2:])[:, None], axis=2)
+    away /= np.sqrt(4 * similar[:, 2] / np.pi)
+    np.put_along_axis(away, fours, np.inf, axis=1)
+    # the places by float32, in the scoring, differ a little
+    return [tuple(four) for four in fours[away.min(axis=1) < 1.5 * MAX_FIFTH_MARK_ERROR].tolist()]
+
+
+def _shares(four: Values) -> Values:
+    """(P, 3): the fourth of (P, 4, 3) points as a sum of the first three, times their determinant."""
+    with_fourth = np.stack([four[:, [3, 1, 2]], four[:, [0, 3, 2]], four[:, [0, 1, 3]]], axis=1)
+    shares: Values = np.linalg.det(with_fourth)
+    return shares
 
 
 def _score_assignment(
