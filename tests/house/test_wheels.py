@@ -97,7 +97,7 @@ def add_arm_libraries(wheel: Path, folder: Path) -> None:
     """The wheel, and NumPy and OpenCV of its processor, in a folder."""
     lines = (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines()
     locked = [line for line in lines if line.startswith(("numpy==", "opencv-"))]
-    systems = [f"--platform=manylinux_2_{minor}_aarch64" for minor in (17, 28)]
+    systems = [f"--platform=manylinux_{each}" for each in ("2_17_aarch64", "2_28_aarch64")]
     words = ["download", "--quiet", "--no-deps", "--only-binary=:all:", "--python-version=3.11", *systems]
     subprocess.run([sys.executable, "-m", "pip", *words, "-d", folder.parent / "wheels", *locked], check=True)
     for each in (wheel, *(folder.parent / "wheels").iterdir()):

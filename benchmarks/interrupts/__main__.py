@@ -78,4 +78,4 @@ def measure(signals: int = 200, until_ms: float = 250.0, seed: int = 1, quick: b
 main = Experiment("interrupts", measure)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())
