@@ -108,13 +108,13 @@ def design_of(fields: object) -> Design:
     return Design(**fields)
 
 
-def design_document(fields: object, look: Look) -> dict[str, Any]:
-    """The drawing, labels, key figures and findings of a design, and its TOML.
+def design_document(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The drawing, labels, key figures and findings of the design of a request, and its TOML.
 
     Raises:
         DesignError: see ``design_of``; or a design without a layout.
     """
-    design = design_of(fields)
+    design, look = design_of(asked.get("fields")), Look.of(asked)
     layout = design.layout
     report = design_report(design, layout, look.camera_px)
     findings = [*report.findings, *clip_findings(layout, look.camera_px)]
@@ -152,13 +152,24 @@ def error_fields(text: str) -> list[str]:
     return list(_fields_in(text, in_palette=False))
 
 
-def remedy_of(fields: object, subject: str, look: Look) -> dict[str, Any]:
+def proposed_design(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The design that ``size`` proposes for a camera, and its figures.
+
+    Raises:
+        CmpDesignError: see ``size``.
+    """
+    from cmpdesign.proposal.camera_design import size
+
+    make, error = asked.get("make") or None, str(asked.get("error") or "") or None
+    proposal = size(str(asked.get("camera", "")), str(asked.get("view", "")), error, make=make)
+    return {"fields": fields_of(proposal.design), "figures": proposal.figures()}
+
+
+def remedy_of(asked: Mapping[str, Any]) -> dict[str, Any]:
     """A change of one field after which a finding is gone and no other finding has come; of a number the smallest.
 
     Args:
-        fields: the design.
-        subject: the finding's subject.
-        look: the camera of the check.
+        asked: the request: design, camera, and the finding's subject.
 
     Returns:
         Field, dotted -> new value; empty where no single field helps.
@@ -166,7 +177,7 @@ def remedy_of(fields: object, subject: str, look: Look) -> dict[str, Any]:
     Raises:
         DesignError: see ``design_of``.
     """
-    design = design_of(fields)
+    design, look, subject = design_of(asked.get("fields")), Look.of(asked), asked.get("subject")
     before = check_design(design, design.layout, look.camera_px)
     finding = next((each for each in before if each.subject == subject), None)
     if finding is None:
