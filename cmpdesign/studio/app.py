@@ -189,7 +189,7 @@ class Studio:
     async def _build(self, request: Request) -> Response:
         asked = await _asked(request)
         design = designs.design_of(asked.get("fields"))
-        names = [str(name) for name in asked.get("products") or ()]
+        names = _texts(asked, "products")
         return JSONResponse(self.builds.start(design, names, Look.of(asked).camera_px).document())
 
     async def _build_state(self, request: Request) -> Response:
@@ -241,11 +241,7 @@ class Studio:
 
     async def _track(self, request: Request) -> Response:
         asked = await _asked(request)
-        keys, rest, kind = (
-            [str(key) for key in asked.get("keys") or ()],
-            asked.get("rest"),
-            str(asked.get("kind")),
-        )
+        keys, rest, kind = _texts(asked, "keys"), asked.get("rest"), str(asked.get("kind"))
         rest = None if rest is None else str(rest)
         return _download(await run_in_threadpool(self.readings.track, keys, rest, kind), f"run.{kind}")
 
@@ -338,6 +334,14 @@ async def _asked(request: Request) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise _Refused(422, "the request is no JSON object")
     return document
+
+
+def _texts(asked: dict[str, Any], name: str) -> list[str]:
+    """The texts of a list in a request."""
+    match asked.get(name, []):
+        case [*items]:
+            return [str(item) for item in items]
+    raise _Refused(422, f"{name}: expected a list")
 
 
 async def _body(request: Request, most_bytes: int) -> bytes:

@@ -34,6 +34,7 @@ LIBRARIES = {
 _TABLES = ("palette", "fiducials", "laser", "mold", "sheet")
 _WORD = re.compile(r"[a-z_]+(?:\.[a-z_]+)?")
 _NOT_IN_FINDINGS = {"name", "description", "source", "extends"}
+MOST_CAMERA_PIXELS = 60_000_000
 _SIZE_FIELDS = ("pitch_mm", "layers", "width_mm", "height_mm")  # a finding on a size names one of them
 _STEPS = 64  # of a remedy, above and below the present value
 _STEP = 1.04  # ratio of such steps
@@ -49,16 +50,18 @@ class Look:
 
     @classmethod
     def of(cls, asked: Mapping[str, Any]) -> Look:
-        """The values of a request; what is missing or of another type has its usual value."""
-        width, height = (*map(str, asked.get("camera") or ()), "", "")[:2]
-        known = (
-            width.isdecimal()
-            and height.isdecimal()
-            and 10 <= int(width) < 10**5
-            and 10 <= int(height) < 10**5
-        )
-        camera_px = (int(width), int(height)) if known else (640, 480)
-        return cls(camera_px, asked.get("back") is True, str(asked.get("labels", "")))
+        """The values of a request; what is missing has its usual value.
+
+        Raises:
+            DesignError: no camera of 10 px a side or more, and of at most ``MOST_CAMERA_PIXELS``.
+        """
+        match asked.get("camera", [640, 480]):
+            case [int(width), int(height)] if (
+                min(width, height) >= 10 and width * height <= MOST_CAMERA_PIXELS
+            ):
+                return cls((width, height), asked.get("back") is True, str(asked.get("labels", "")))
+        most = MOST_CAMERA_PIXELS // 10**6
+        raise DesignError(f"camera: expected width and height, 10 px or more, and at most {most} megapixels")
 
 
 def start_document() -> dict[str, Any]:

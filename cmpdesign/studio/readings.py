@@ -245,11 +245,11 @@ class Readings:
         """
         from cmpdesign.api.sequences import track
 
-        read = [self.get(key) for key in keys]
+        read = [self.get(key) for key in keys[: MOST_KEPT + 1]]
         if kind not in KINDS:
             raise CmpDesignError(f"{kind[:20]}: expected one of {', '.join(KINDS)}")
-        if not read or len({one.verifier.reference.digest for one in read}) > 1:
-            raise CmpDesignError("choose pictures that were read with one layout")
+        if not 0 < len(read) <= MOST_KEPT or len({one.verifier.reference.digest for one in read}) > 1:
+            raise CmpDesignError(f"choose 1 to {MOST_KEPT} pictures that were read with one layout")
         with tempfile.TemporaryDirectory(prefix="cmpdesign-studio-") as folder:
             frames = Path(folder) / "frames"
             frames.mkdir()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cmpdesign.tracking.sinks.tables import FrameSink
 
 KINDS = ("npz", "csv", "parquet", "mcap")
-MOST_FRAMES = 20_000  # of one recording; 331 markers take 6 kB a frame
+MOST_ROWS = 10_000_000  # frames x markers of one recording, about 700 MB before it is compressed
 MOST_KEPT = 3
 
 
@@ -82,9 +82,9 @@ class Recorder:
             self._sink = open_sink(path, self._table())
 
     def add(self, frame: Any, image: Any = None) -> None:
-        """Take a frame, if a recording runs; it ends by itself at ``MOST_FRAMES``."""
+        """Take a frame, if a recording runs; it ends by itself at ``MOST_ROWS``."""
         with self._lock:
-            if self._sink is not None and self._frames < MOST_FRAMES:
+            if self._sink is not None and self._frames * len(frame.markers.status) < MOST_ROWS:
                 self._sink.add(frame)
                 self._frames += 1
 

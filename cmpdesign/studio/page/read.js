@@ -24,14 +24,14 @@ export class ReadPart {
     this.layoutReset = h("button", { class: "tiny", onclick: () => this.#setLayout({ key: "", about: "" }) }, "Use the design");
     this.list = h("div", { class: "box", hidden: true });
     this.result = h("div", { class: "results" });
-    this.pickedBox = h("div", { class: "box" }, h("h2", {}, "Marker"), h("p", { class: "soft" }, "Click a marker to see all about it."));
+    this.pickedBox = h("div", { class: "box" });
     const toggle = (text, name) => h("button", { "aria-pressed": String(this.look[name]), onclick: (event) => { this.look[name] = !this.look[name]; event.target.setAttribute("aria-pressed", String(this.look[name])); this.#draw(); } }, text);
     this.arrows = h("select", { "aria-label": "Displacement arrows", onchange: () => { this.look.arrows = this.arrows.value; this.#compare(); } },
       h("option", { value: "none" }, "No arrows"), h("option", { value: "rest" }, "From the picture at rest"), h("option", { value: "flat" }, "From the flat pattern"));
-    this.scale = h("input", { type: "range", min: 0, max: 2.5, step: 0.05, value: 1, "aria-label": "Arrows and deviations, enlarged", oninput: () => this.#draw() });
+    this.scale = h("input", { type: "range", min: 0, max: 2.5, step: 0.05, value: 1, "aria-label": "Arrows, enlarged", oninput: () => { this.isScaled = true; this.#draw(); } });
     this.note = h("p", { class: "note", hidden: true });
     const frame = h("section", { class: "stage", "aria-label": "Picture" }, h("div", { class: "bar" }, toggle("Gridlines", "grid"), toggle("Ids", "ids"), toggle("Deviations", "ellipses"), this.arrows,
-      h("label", { class: "row" }, "Enlarged", this.scale), h("span", { class: "gap" }), this.stage.buttons()), this.stage.element, this.note);
+      h("label", { class: "row" }, "× ", this.scale), h("span", { class: "gap" }), this.stage.buttons()), this.stage.element, this.note);
     this.element = h("div", { class: "work two" }, h("aside", { class: "side", "aria-label": "Reading" },
       h("div", { class: "box" }, drop, h("div", { class: "row" }, this.layoutWords, h("button", { class: "tiny", onclick: () => this.#openLayout() }, "Other layout"), this.layoutReset)), this.list, this.result, this.pickedBox), frame);
     this.element.addEventListener("dragover", (event) => { event.preventDefault(); drop.classList.add("over"); });
@@ -77,6 +77,7 @@ export class ReadPart {
   async #choose(found) {
     this.found = found;
     this.picked = null;
+    this.pickedBox.replaceChildren(h("h2", {}, "Marker"), h("p", { class: "soft" }, "Click a marker to see all about it."));
     // An unread picture is shown at the last stage that was reached.
     this.shownPicture = found.xy && !found.xy.length && found.stages.length ? found.stages.at(-1) : "picture";
     this.#show();
@@ -116,6 +117,9 @@ export class ReadPart {
           const moved = await ask(`/api/readings/${found.key}/moved${from === "rest" ? `?rest=${this.rest.key}` : ""}`);
           if (found !== this.found || from !== this.look.arrows) return;
           this.moved = moved;
+          // The longest arrow has the length of some gridlines, until the user chooses.
+          const longest = Math.max(...moved.px.map((by) => (by ? Math.hypot(...by) : 0)));
+          if (!this.isScaled) this.scale.value = Math.log10(Math.max((2.5 * (found.quality?.edge_px ?? 20)) / longest, 1));
         } catch (error) { problem = error.message; }
       }
     }
@@ -144,8 +148,10 @@ export class ReadPart {
       if (this.look.grid) layers.push(h("path", { class: "gridlines", d: edges.map(([from, to]) => `M${xy[from]}L${xy[to]}`).join("") }));
       layers.push(h("g", { class: "dots", "stroke-width": 5 }, [1, 2, 3].map((code) => h("path", { class: `s${code}`, d: xy.filter((_, at) => status[at] === code).map((point) => `M${point}h0`).join("") }))));
       if (this.look.ellipses) {
-        layers.push(h("g", { class: "ellipses" }, xy.map(([x, y], at) => ellipse(x, y, cov[at], 10 * enlarged))));
-        notes.push(`Ellipses: one standard deviation, × ${number(10 * enlarged, 2)}.`);
+        const sigmas = cov.map(([xx, , yy]) => Math.sqrt(xx + yy)).sort((one, other) => one - other);
+        const factor = roundFactor((0.35 * (quality?.edge_px ?? 20)) / (sigmas[sigmas.length >> 1] || 1));
+        layers.push(h("g", { class: "ellipses" }, xy.map(([x, y], at) => ellipse(x, y, cov[at], factor))));
+        notes.push(`Ellipses: one standard deviation, × ${factor}.`);
       }
       if (this.moved) {
         const head = 0.18 * (quality?.edge_px ?? 20);
@@ -194,6 +200,12 @@ export class ReadPart {
     this.ring.setAttribute("cx", x);
     this.ring.setAttribute("cy", y);
   }
+}
+
+// 1, 2 or 5 times a power of ten, at most a value.
+function roundFactor(value) {
+  const decade = 10 ** Math.floor(Math.log10(value));
+  return Math.max(1, Math.max(...[1, 2, 5].filter((digit) => digit * decade <= value)) * decade);
 }
 
 function arrow([x, y], [dx, dy], head) {
