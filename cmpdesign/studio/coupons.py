@@ -17,8 +17,6 @@ from cmpdesign.products.laser.grid.design import design_grid
 from cmpdesign.products.laser.grid.reading import read_grid
 from cmpdesign.products.laser.setup import complete_setup
 
-MOST_PIXELS = 60_000_000  # width x height, tested before a picture is decoded
-
 
 def coupons_of(design: Design) -> list[Coupon]:
     """The coupon and the grid of the design's laser job; none where the job cannot be."""
@@ -29,9 +27,11 @@ def coupons_of(design: Design) -> list[Coupon]:
     return [design_coupon(setup), design_grid(setup)]
 
 
-def coupon_readings(coupons: Sequence[Coupon], file: Path) -> Iterator[tuple[Coupon, Any, tuple[int, int]]]:
+def coupon_readings(
+    coupons: Sequence[Coupon], file: Path, most_pixels: int
+) -> Iterator[tuple[Coupon, Any, tuple[int, int]]]:
     """The coupons that a picture shows, with what was read."""
-    image = read_image(file, MOST_PIXELS, gray=True)
+    image = read_image(file, most_pixels, gray=True)
     for coupon in coupons:
         try:
             if coupon.kind == "grid":

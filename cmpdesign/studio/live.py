@@ -12,19 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmpdesign.api.sequences import track_job
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import decode_bytes, to_jpeg
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.studio.readings import in_8_bits
 from cmpdesign.studio.recording import Recorder, Recordings
-from cmpdesign.tracking.live.view import LiveCount
-from cmpdesign.tracking.table import TrackTable
-from extractor import Tracker
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cmpdesign.tracking.live.view import LiveCount
     from cmpdesign.tracking.run import TrackingRun
     from extractor import Reference
     from extractor.contact import ContactForce
@@ -110,6 +107,8 @@ class LiveFeed:
 
     def count(self) -> LiveCount:
         """The counts so far."""
+        from cmpdesign.tracking.live.view import LiveCount
+
         shown = 0 if self._latest is None else self._latest.count + 1
         return LiveCount(shown, 0, False, self.failure)
 
@@ -127,6 +126,9 @@ class LiveFeed:
 
     def follow(self, run: TrackingRun) -> Thread:
         """Start the run in a thread; a failure is told to the page."""
+        from cmpdesign.tracking.table import TrackTable
+        from extractor import Tracker
+
         self.run, run.live = run, self  # type: ignore[assignment]
         if isinstance(run.tracker, Tracker):
             self.recorder = Recorder(lambda: TrackTable(run.tracker, lambda: run.source.times))
@@ -162,6 +164,9 @@ class CameraReader:
     """Reads the frames that the browser's camera sends, one after the other."""
 
     def __init__(self, layout: Reference) -> None:
+        from cmpdesign.tracking.table import TrackTable
+        from extractor import Tracker
+
         self._tracker = Tracker(layout, side="either")
         self.recorder: Recorder | None = Recorder(lambda: TrackTable(self._tracker))
         self._times: deque[float] = deque(maxlen=_RATE_FRAMES)
@@ -199,6 +204,8 @@ def open_camera(layout: Reference, number: int) -> LiveFeed:
     Raises:
         CmpDesignError: the camera cannot be opened.
     """
+    from cmpdesign.api.sequences import track_job
+
     with tempfile.TemporaryDirectory(prefix="cmpdesign-studio-") as folder:
         run = track_job(layout, number, Path(folder) / "run.npz", side="either").prepare()
         run.sink.close()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import secrets
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -19,21 +20,19 @@ from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import IMAGE_BITS, ImageFileError, read_image, to_jpeg
 from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.files import read_file
-from cmpdesign.products.laser.coupon.design import Coupon, parse_coupon
-from cmpdesign.studio.coupons import MOST_PIXELS, coupon_readings, coupons_of
 from cmpdesign.studio.recording import KINDS
 from extractor import Reference
 from extractor.layout.layout_file import parse_layout
-from extractor.numeric.homographies import mapped
-from extractor.track.displacement import fit_rest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cmpdesign.api.designs import Design
+    from cmpdesign.products.laser.coupon.design import Coupon
     from extractor import Markers
 
 MOST_PICTURE_BYTES = 64 << 20
+MOST_PIXELS = 60_000_000  # width x height, tested before a picture is decoded
 MOST_KEPT = 40  # pictures, as files
 MOST_LAYOUTS = 8
 JPEG_QUALITY = 92
@@ -89,6 +88,9 @@ class Reading:
         Raises:
             CmpDesignError: the pictures cannot be compared.
         """
+        from extractor.numeric.homographies import mapped
+        from extractor.track.displacement import fit_rest
+
         reference = self.verifier.reference
         if self.markers is None or (rest is not None and rest.markers is None):
             raise CmpDesignError(
@@ -145,6 +147,8 @@ class Readings:
         Raises:
             CmpDesignError, LayoutError: the text is neither.
         """
+        from cmpdesign.products.laser.coupon.design import parse_coupon
+
         document = parse_json(text, "the layout")
         key = secrets.token_hex(8)
         if isinstance(document, dict) and document.get("format") == "cmp-coupon":
@@ -189,9 +193,7 @@ class Readings:
         file = folder / f"{_PICTURE}{suffix if suffix in IMAGE_BITS else ''}"
         try:
             write_file(file, data)
-            given = self._layouts.get(layout)
-            coupons = [given] if isinstance(given, Coupon) else coupons_of(design)
-            reading = self._judged(reference, coupons, name, file)
+            reading = self._judged(reference, partial(self._coupons, design, layout), name, file)
         except BaseException as error:
             shutil.rmtree(folder, ignore_errors=True)
             if isinstance(error, CmpDesignError):
@@ -267,7 +269,16 @@ class Readings:
         for reading in list(self._readings.values()):
             self._forget(reading)
 
-    def _judged(self, reference: Reference, coupons: Sequence[Any], name: str, file: Path) -> Reading:
+    def _coupons(self, design: Design, layout: str) -> list[Coupon]:
+        """The coupon of a key; else those of the design's laser job."""
+        from cmpdesign.studio.coupons import coupons_of
+
+        given = self._layouts.get(layout)
+        return coupons_of(design) if given is None or isinstance(given, Reference) else [given]
+
+    def _judged(
+        self, reference: Reference, coupons: Callable[[], list[Coupon]], name: str, file: Path
+    ) -> Reading:
         """The reading of a file; a picture without a marker may show a coupon."""
         if self._verifier is None or self._verifier.reference.digest != reference.digest:
             self._verifier = Verifier(reference, max_pixels=MOST_PIXELS)
@@ -279,8 +290,10 @@ class Readings:
             problem = error
         key = secrets.token_hex(8)
         markers = getattr(verdict, "markers", None)
+        from cmpdesign.studio.coupons import coupon_readings
+
         if verdict is None or (markers is not None and not markers.found):
-            for coupon, found, shown_px in coupon_readings(coupons, file):
+            for coupon, found, shown_px in coupon_readings(coupons(), file, MOST_PIXELS):
                 return Reading(key, name, file, verifier, shown_px, found, coupon)
         if problem is not None:
             raise problem

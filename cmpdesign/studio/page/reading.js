@@ -45,7 +45,7 @@ function couponBoxes({ name, kerf, material }) {
   const rows = kerf.patches.map((one) => h("tr", {}, h("th", { scope: "row" }, one.name), h("td", {}, `${one.power_percent} %, ${one.speed_mm_s} mm/s, ${one.passes} ×`), h("td", {}, one.kerf_x_mm.toFixed(4)), h("td", {}, one.kerf_y_mm.toFixed(4)),
     h("td", {}, Math.max(one.kerf_x_sigma_mm, one.kerf_y_sigma_mm).toFixed(4)), h("td", {}, h("button", { class: "tiny", "aria-label": `Use the kerf of ${one.name}`, onclick: () => take(one) }, "Use"))));
   return [box(name, verdict(true, "Coupon of the kerf", `${material}; openings of the ${kerf.face} are seen, ${number(kerf.scale_px_mm, 4)} px in a mm, marks fit to ${number(1000 * kerf.fit_mm, 2)} µm; light: ${kerf.response}.`)),
-    box("Kerf at the front, mm", table(["", "Settings", "x", "y", "±", ""], rows), h("p", { class: "soft small" }, `x of cuts along y, y of cuts along x${kerf.taper_assumed ? `; the taper of ${kerf.taper_deg}° is assumed` : ""}.`))];
+    box("Kerf at the front, mm", table(["Patch", "Settings", "x", "y", "±", "Take"], rows), h("p", { class: "soft small" }, `x of cuts along y, y of cuts along x${kerf.taper_assumed ? `; the taper of ${kerf.taper_deg}° is assumed` : ""}.`))];
 }
 
 function gridBoxes({ name, grid, material }) {
@@ -57,7 +57,7 @@ function gridBoxes({ name, grid, material }) {
   const counts = Object.keys(grid.fields[0].windows);
   const rows = grid.fields.map((one) => h("tr", { class: one === best ? "best" : null }, h("th", { scope: "row" }, one.name), h("td", {}, `${one.power_percent} %, ${one.speed_mm_s} mm/s`), counts.map((count) => h("td", {}, one.windows[count]))));
   return [box(name, verdict(Boolean(best), "Grid of settings", best ? `${material}: ${best.name} is the quickest that cuts with a pass in reserve: ${best.power_percent} %, ${best.speed_mm_s} mm/s, ${reserve} passes.` : "No field cuts through with a pass in reserve: raise the power, or lower the speed."),
-    best ? h("button", { onclick: take }, "Use in the design") : ""), box("Windows by passes", table(["", "Settings", ...counts.map((count) => `${count} ×`)], rows))];
+    best ? h("button", { onclick: take }, "Use in the design") : ""), box("Windows by passes", table(["Field", "Settings", ...counts.map((count) => `${count} ×`)], rows))];
 }
 
 const table = (heads, rows) => h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Values" }, h("table", {}, h("thead", {}, h("tr", {}, heads.map((head) => h("th", { scope: "col" }, head)))), h("tbody", {}, rows)));
