@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -89,6 +89,27 @@ class GridReading:
     def best(self) -> FieldReading | None:
         cut = [one for one in self.fields if one.passes is not None and one.passes < max(one.states)]
         return min(cut, key=lambda one: one.time_s_mm, default=None)
+
+    def to_json(self) -> dict[str, Any]:
+        """The reading as in the document of ``kerf``."""
+        fields = []
+        for one in self.fields:
+            low, high = one.depth_per_pass_mm
+            fields.append(
+                {
+                    "name": one.name,
+                    "power_percent": one.power_percent,
+                    "speed_mm_s": one.speed_mm_s,
+                    "windows": one.states,
+                    "depths_mm": one.depths_mm,
+                    "passes": one.passes,
+                    "least_depth_per_pass_mm": low,
+                    "most_depth_per_pass_mm": None if high == float("inf") else high,
+                }
+            )
+        best = None if self.best is None else self.best.name
+        scale = round(self.scale_px_mm, 4)
+        return {"scale_px_mm": scale, "from_back": self.from_back, "best": best, "fields": fields}
 
 
 def read_grid(grid: Coupon, image: Image, response: Response = "srgb") -> GridReading:
