@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import synthesis as native
-from extractor.localmap.regularised_maps import LIMITS as MAP_LIMITS
-from extractor.localmap.regularised_maps import RegularisedMapLimits
+from extractor.layout.topology import FIRM_RIDGE, MIN_FIRM_MARKERS
 
 
 class GridlineLimits(NamedTuple):
@@ -26,12 +25,22 @@ class GridlineLimits(NamedTuple):
     Attributes:
         max_slope: of a gridline against its chord; a larger slope is an error of the map. Chosen.
         min_length_px: px, of the chord; no shorter gridline is known. Chosen.
-        maps: limits of the maps where a ring is incomplete.
+        min_spread: of the neighbours of an incomplete ring, across to along; below it they lie on one line. Chosen.
+        min_neighbours: known ones; fewer do not determine the slopes. Derived: two slopes.
+        min_curved_neighbours: known ones; with fewer the map is linear. Derived: five derivatives.
+        min_firm_neighbours: known ones; with fewer the curvature is held by ``weak_ridge``. Chosen.
+        firm_ridge, weak_ridge: added to the diagonal of the second derivatives' normal equations with enough neighbours
+            and with few; the unit is that of the layout's vectors. Chosen.
     """
 
     max_slope: float = 0.5
     min_length_px: float = 1.0
-    maps: RegularisedMapLimits = MAP_LIMITS
+    min_spread: float = 0.2
+    min_neighbours: int = 2
+    min_curved_neighbours: int = 5
+    min_firm_neighbours: int = MIN_FIRM_MARKERS
+    firm_ridge: float = FIRM_RIDGE
+    weak_ridge: float = 0.02
 
 
 LIMITS = GridlineLimits()

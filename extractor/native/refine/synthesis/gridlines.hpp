@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "base/array.hpp"
-#include "localmap/regularised_maps.hpp"
 
 namespace cmp::refine {
 
@@ -21,12 +20,20 @@ inline constexpr Index FIRST_RING = 6;
 
 // Limits of gridlines; explained in extractor/refine/synthesis/gridlines.py.
 struct GridlineLimits {
-  double max_slope, min_length_px;
-  localmap::RegularisedMapLimits maps;
+  double max_slope, min_length_px, min_spread;
+  Index min_neighbours, min_curved_neighbours, min_firm_neighbours;
+  double firm_ridge, weak_ridge;
 
   template <class F>
   static GridlineLimits read(const F& f) {
-    return {f["max_slope"], f["min_length_px"], f["maps"]};
+    return {f["max_slope"],
+            f["min_length_px"],
+            f["min_spread"],
+            f["min_neighbours"],
+            f["min_curved_neighbours"],
+            f["min_firm_neighbours"],
+            f["firm_ridge"],
+            f["weak_ridge"]};
   }
 };
 
