@@ -11,10 +11,6 @@ from extractor._native import numbering as native
 from extractor.layout.lattice_tables import Lattice
 from extractor.numbering.missing_cells import NumberedTriangles
 
-AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend; chosen
-# in edges, between a marker's place by its gridlines and a correct initial place; chosen
-MAX_PLACE_ERROR = 0.1
-
 
 class CornerLimits(NamedTuple):
     """Limits of corners.

@@ -11,10 +11,8 @@ struct MapPrior {
   double quadratic;  // of the terms of degree 2
   double cubic;      // of the terms of degree 3
 
-  template <class F>
-  static MapPrior read(const F& f) {
-    return {f["noise"], f["quadratic"], f["cubic"]};
-  }
+  CMP_FIELDS(noise, quadratic, cubic)
+
   // of a map whose terms deviate by this share of the prior
   localmap::MapRidge ridge(double share = 1.0) const {
     const double square = noise / (share * quadratic), cube = noise / (share * cubic);

@@ -10,40 +10,10 @@ curves by the map's second derivatives (``marker_scatter``).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import synthesis as native
-from extractor.layout.topology import FIRM_RIDGE, MIN_FIRM_MARKERS
-
-
-class GridlineLimits(NamedTuple):
-    """Limits of gridlines.
-
-    Attributes:
-        max_slope: of a gridline against its chord; a larger slope is an error of the map. Chosen.
-        min_length_px: px, of the chord; no shorter gridline is known. Chosen.
-        min_spread: of the neighbours of an incomplete ring, across to along; below it they lie on one line. Chosen.
-        min_neighbours: known ones; fewer do not determine the slopes. Derived: two slopes.
-        min_curved_neighbours: known ones; with fewer the map is linear. Derived: five derivatives.
-        min_firm_neighbours: known ones; with fewer the curvature is held by ``weak_ridge``. Chosen.
-        firm_ridge, weak_ridge: added to the diagonal of the second derivatives' normal equations with enough neighbours
-            and with few; the unit is that of the layout's vectors. Chosen.
-    """
-
-    max_slope: float = 0.5
-    min_length_px: float = 1.0
-    min_spread: float = 0.2
-    min_neighbours: int = 2
-    min_curved_neighbours: int = 5
-    min_firm_neighbours: int = MIN_FIRM_MARKERS
-    firm_ridge: float = FIRM_RIDGE
-    weak_ridge: float = 0.02
-
-
-LIMITS = GridlineLimits()
 
 
 def local_maps(
@@ -65,7 +35,7 @@ def local_maps(
     Returns:
         (M, 2, 5): derivatives of x and y by the layout's x, y, xx, xy, yy; NaN where unknown.
     """
-    return np.asarray(native.local_maps(xy, near, offset, stencil, LIMITS))
+    return native.local_maps(xy, near, offset, stencil)
 
 
 def gridlines(
@@ -89,4 +59,4 @@ def gridlines(
         (E, 8): start and unit vector of the chord, its length, px; slopes against the chord at both ends, towards
         (-uy, ux); 1 where known. All 0 where unknown.
     """
-    return np.asarray(native.gridlines(xy, maps, bend, edges, along, scatter_share, LIMITS))
+    return native.gridlines(xy, maps, bend, edges, along, scatter_share)

@@ -18,23 +18,18 @@ inline constexpr Index X = 0, Y = 1, UX = 2, UY = 3, LENGTH = 4, LEAVE = 5, ARRI
 inline constexpr Index LINE_COLUMNS = 8;
 inline constexpr Index FIRST_RING = 6;
 
-// Limits of gridlines; explained in extractor/refine/synthesis/gridlines.py.
+// Limits of gridlines.
 struct GridlineLimits {
-  double max_slope, min_length_px, min_spread;
-  Index min_neighbours, min_curved_neighbours, min_firm_neighbours;
-  double firm_ridge, weak_ridge;
-
-  template <class F>
-  static GridlineLimits read(const F& f) {
-    return {f["max_slope"],
-            f["min_length_px"],
-            f["min_spread"],
-            f["min_neighbours"],
-            f["min_curved_neighbours"],
-            f["min_firm_neighbours"],
-            f["firm_ridge"],
-            f["weak_ridge"]};
-  }
+  double max_slope = 0.5;  // of a gridline against its chord; a larger slope is an error of the map. Chosen.
+  double min_length_px = 1.0;  // px, of the chord; no shorter gridline is known. Chosen.
+  // of the neighbours of an incomplete ring, across to along; below it they lie on one line. Chosen.
+  double min_spread = 0.2;
+  Index min_neighbours = 2;         // fewer do not determine the slopes. Derived: two slopes.
+  Index min_curved_neighbours = 5;  // with fewer the map is linear. Derived: five derivatives.
+  Index min_firm_neighbours = 8;    // with fewer the curvature is held by weak_ridge. Chosen.
+  // added to the diagonal of the second derivatives' normal equations with enough neighbours and with few;
+  // the unit is that of the layout's vectors. Chosen.
+  double firm_ridge = 0.001, weak_ridge = 0.02;
 };
 
 // Markers (M, 2) px with predictions, and (M,) the predicted ones.
