@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -281,19 +282,16 @@ class Extractor:
         repaired = repair_markers(refined, places, self._lattice, size)
         rows = find_row_break(self._topology, repaired, size)
         repaired = stages.record("repair", beside_row_break(rows, repaired))
-        located = locate_virtual_markers(self._topology, repaired, refined.points, refined.scatter)
-        virtual = stages.record("virtual", located)
+        virtual = partial(locate_virtual_markers, self._topology, repaired, refined.points, refined.scatter)
         few = is_less_than_half_reported(repaired.xy_px, self.layout.xy_mm, self._lattice.present, size)
         view, cells = pyramid.level(1), self._sampled_cells
         quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined.blur_px)
         quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
-        markers = Markers(
+        markers = Markers.with_later(
+            virtual,
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,
             status=repaired.status,
-            virtual_xy_px=virtual.xy_px,
-            virtual_cov_px2=virtual.cov_px2,
-            virtual_status=virtual.status,
             mirrored=numbered.mirrored,
             origin=numbered.origin,
             reason=Reason.FEW_MARKERS if few else None,
