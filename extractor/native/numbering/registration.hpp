@@ -28,10 +28,7 @@ struct RegisteredLayout {
   View<const std::int32_t, 2> white_axial;  // (W, 2) of the white down-cells
   View<const std::int32_t, 2> cell_lookup;  // (S, S), as Lattice.cell_lookup
 
-  template <class F>
-  static RegisteredLayout read(const F& f) {
-    return {f["axial"], f["white_axial"], f["cell_lookup"]};
-  }
+  CMP_FIELDS(axial, white_axial, cell_lookup)
 };
 
 // The K best motions, the best first: (K, 3) turn, dq and dr; scores (K,), log odds; white (K,), the log
