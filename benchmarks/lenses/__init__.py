@@ -1,0 +1,1 @@
+"""Cameras that are calibrated from pictures of a sheet: errors of rays against truth, and residuals of real corners."""
