@@ -1,167 +1,231 @@
-"""Depth of a press after each step of the calibration of a sensor, by Monte Carlo over calipers and data sheets.
+"""Cameras calibrated by ``calibrate_camera`` from rendered pictures of a sheet, against truth; and from real corners.
 
-A sensor: one camera that sees the pad's back in two mirrors, 15 to 20 degrees to either side, 25 or 55 mm away, through
-2 to 3 mm of acrylic or glass and 2 to 5 mm of silicone. Markers are projected through window and gel, with noise of
-0.006 px per axis, which is what the reader states in good light. What the user states differs from the truth by random
-errors of the stated deviations. A press of 0.5 mm is then read; the error is that of its mean depth, over the press.
-z is the RMS of errors over the deviations that ``reconstruct`` states, of noise and systematic ones.
+Random cameras of 40 to 120 degrees (1280x960), 20 pictures each, the whole reader and the search for the response
+included. "Seen" is the part of the image within the convex hull of all points; errors of rays are RMS per axis after a
+common turn, pooled over cameras; z is the RMS of errors over their covariances. "CPU" is the median of one call. With
+``--corners``, points of a chessboard as in tests/support/calibration are fitted, too, beside ``cv2.calibrateCamera``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-from types import MappingProxyType
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.frame.experiment import Experiment, Shown
+import cmpdesign
+from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.suites.lenses.cameras import SIZE_PX, random_camera
+from benchmarks.suites.lenses.pictures import BAD_KINDS, Conditions, take_pictures, to_view
 from benchmarks.suites.scenes import standard_layout
-from cmpdesign.calibration.rig.calibration import calibrate_rig_markers
-from cmpdesign.files.layout_json import layout_to_json
-from extractor import Markers, Reconstructor, Reference, Rig, Status, View, parse_layout
-from extractor.space.medium import Medium
+from cmpdesign.calibration.camera import CameraCalibration, calibrate_points
+from cmpdesign.calibration.rays import pixel_grid, ray_covariances, ray_differences
+from cmpdesign.calibration.sightings import Sheet, Sighting
+from extractor import View
 
 Array = NDArray[np.float64]
-
-PRESS_MM, NOISE_PX, PITCH_PX_MM = 0.5, 0.006, 0.55
-DISTORTION = (-0.08, 0.03, 0.0005, -0.0008, 0.0)
-COARSE = {"gel_mm": 0.5, "gel_index": 0.02, "window_mm": 0.2}  # by eye, and from a book
-FINE = {"gel_mm": 0.1, "gel_index": 0.005, "window_mm": 0.05}  # calipers and the data sheet
-LOOSE_PX, CALIBRATED_PX = 18.0, 0.05  # deviation of the focal length: of a data sheet, of calibrate camera
-# What is known -> deviations of the medium, of the focal length, steps of a plate and their deviation in mm.
-ROWS = {
-    "data sheets only": (COARSE, LOOSE_PX, (), 0.0),
-    "+ calibrate camera": (COARSE, CALIBRATED_PX, (), 0.0),
-    "+ calipers and the gel's data sheet": (FINE, CALIBRATED_PX, (), 0.0),
-    "+ two steps of a plate, 2 um": (FINE, CALIBRATED_PX, (0.3, 1.3), 0.002),
-    "+ two steps of a plate, 0.5 um": (FINE, CALIBRATED_PX, (0.3, 1.3), 0.0005),
+PICTURES, BAD, WIDE_DEG, FOLDS = 20, 2, 100.0, 5
+CONDITIONS = {
+    "flat": Conditions(jpeg_quality=None),
+    "bent by 0.5 mm": Conditions(bend_mm=0.5, jpeg_quality=None),
+    "tone curve 2.2": Conditions(response=2.2, jpeg_quality=None),
+    "JPEG 90": Conditions(),
+    "all, 2 of 20 bad": Conditions(bend_mm=0.5, response=2.2),
 }
-DISTANCES_MM = (25.0, 55.0)
 
 
-def true_views(distance_mm: float, rng: np.random.Generator) -> tuple[View, ...]:
-    """Two views of one camera in mirrors, through window and gel."""
-    medium = Medium(
-        float(rng.uniform(2, 5)),
-        float(rng.normal(1.41, 0.005)),
-        float(rng.uniform(2, 3)),
-        float(rng.choice((1.49, 1.52))),
+@dataclass(frozen=True)
+class CameraFigures:
+    """One camera: errors px per axis, over the image and over the part with points; pictures that are left out."""
+
+    condition: str
+    field_deg: float
+    model: str
+    image_px: float
+    seen_px: float
+    stated_px: float
+    z: float
+    bad_found: int
+    bad: int
+    good_refused: int
+    cpu_s: float
+
+
+def calibrate_one(condition: str, seed: int, number: int) -> CameraFigures:
+    """One random camera, its pictures, its calibration, and the errors."""
+    rng = np.random.default_rng([seed, number])
+    camera, taken = random_camera(rng), CONDITIONS[condition]
+    bad: dict[int, str] = {}
+    if "bad" in condition:
+        places = rng.choice(PICTURES, BAD, replace=False)
+        bad = {int(place): str(rng.choice(BAD_KINDS)) for place in places}
+        taken = Conditions(taken.bend_mm, tuple(bad.items()), taken.jpeg_quality, taken.response)
+    layout = standard_layout(layers=10)
+    pictures = take_pictures(camera, layout, PICTURES, taken, rng)
+    begin = time.process_time()
+    found = cmpdesign.calibrate_camera(layout, pictures).calibration
+    cpu_s = time.process_time() - begin
+    view = to_view(camera.pinhole)
+    refused = {number for number, one in enumerate(found.pictures) if not one.used}
+    every, seen = pixel_grid(SIZE_PX), _seen(found)
+    error, cov = ray_differences(found.camera, view, seen), ray_covariances(found.camera, found.cov, seen)
+    d2 = np.einsum("ni,nij,nj->n", error, np.linalg.pinv(cov, hermitian=True), error)
+    return CameraFigures(
+        condition,
+        camera.field_deg,
+        found.model.name,
+        _rms(ray_differences(found.camera, view, every)),
+        _rms(error),
+        float(np.sqrt(np.nanmean(np.trace(cov, axis1=1, axis2=2)) / 2)),
+        float(np.sqrt(np.nanmean(d2) / 2)),
+        len(refused & set(bad)),
+        len(bad),
+        len(refused - set(bad)),
+        cpu_s,
     )
-    focal_px = 900.0
-    views = []
-    for number, side in enumerate((-1.0, 1.0)):
-        angle = side * np.radians(rng.uniform(15, 20))
-        position = distance_mm * np.array([np.sin(angle), 0.0, -np.cos(angle)])
-        forward = -position / distance_mm
-        right = np.cross([0.0, 1.0, 0.0], forward)
-        rotation = np.diag([-1.0, 1, 1]) @ np.array([right / np.linalg.norm(right), [0.0, 1, 0], forward])
-        views.append(
-            View("left" if side < 0 else "right", (focal_px, focal_px), (640.0, 360.0), DISTORTION,
-                 (640 * number, 0, 640, 720), None, rotation, -rotation @ position, medium=medium)
-        )  # fmt: skip
-    return tuple(views)
 
 
-def markers_of(layout: Reference, view: View, xyz_mm: Array, rng: np.random.Generator) -> Markers:
-    """What the reader would find."""
-    count, virtual = len(xyz_mm), (len(layout.edges), layout.virtual_per_edge)
-    return Markers(
-        xy_px=view.project(xyz_mm) + rng.normal(0, NOISE_PX, (count, 2)),
-        cov_px2=np.tile(NOISE_PX**2 * np.eye(2), (count, 1, 1)),
-        status=np.full(count, Status.MEASURED, np.uint8),
-        virtual_xy_px=np.full((*virtual, 2), np.nan),
-        virtual_cov_px2=np.full((*virtual, 2, 2), np.nan),
-        virtual_status=np.zeros(virtual, np.uint8),
-        mirrored=bool(np.linalg.det(view.R_camera_from_layout) * view.position_mm[2] < 0),
-        reason=None,
-        timings_ms=MappingProxyType({}),
+def _seen(found: CameraCalibration) -> Array:
+    points = np.concatenate([one.xy_px for one in found.adjusted.problem.sightings])
+    hull = cv2.convexHull(points.astype(np.float32))
+    grid = pixel_grid(SIZE_PX, 48, 36)
+    return grid[[cv2.pointPolygonTest(hull, (float(x), float(y)), False) > 0 for x, y in grid]]
+
+
+def _rms(error: Array) -> float:
+    return float(np.sqrt(np.nanmean(error**2)))
+
+
+def pooled_row(name: str, rows: Sequence[CameraFigures]) -> tuple[object, ...]:
+    """One row of the table: pooled over cameras up to 100 degrees, or beyond."""
+    pooled = [
+        float(np.sqrt(np.mean(np.square([getattr(row, one) for row in rows]))))
+        for one in ("seen_px", "stated_px", "z", "image_px")
+    ]
+    bad = f"{sum(row.bad_found for row in rows)} of {sum(row.bad for row in rows)}"
+    refused, cpu_s = sum(row.good_refused for row in rows), float(np.median([row.cpu_s for row in rows]))
+    return (name, len(rows), *pooled, bad, refused, cpu_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A camera, and the points (M, 3) mm of the sheet as it found them."""
+
+    view: View
+    xyz_mm: Array
+
+
+def read_corners(path: Path) -> tuple[Sheet, list[Sighting]]:
+    """The points of a chessboard, row by row, in squares; the pictures have the size of ``SIZE_PX``."""
+    document = json.loads(path.read_text(encoding="utf-8"))
+    board = document["board"]
+    places = [(column, row) for row in range(board["rows"]) for column in range(board["columns"])]
+    ids = np.arange(len(places))
+    found = [Sighting(view["picture"], ids, np.array(view["xy_px"])) for view in document["views"]]
+    return Sheet(np.array(places, float)), found
+
+
+def by_opencv(flags: int, count: int, sheet: Sheet, sightings: Sequence[Sighting]) -> Fitted:
+    """The camera of cv2.calibrateCamera."""
+    places = [sheet.flat_mm[one.ids].astype(np.float32) for one in sightings]
+    pixels = [one.xy_px.astype(np.float32)[:, None] for one in sightings]
+    _, k, lens, _, _ = cv2.calibrateCamera(places, pixels, SIZE_PX, None, None, flags=flags)  # type: ignore[call-overload]
+    return Fitted(
+        View("opencv", (k[0, 0], k[1, 1]), (k[0, 2], k[1, 2]), tuple(lens.ravel()[:count])), sheet.flat_mm
     )
 
 
-def depth_errors(distance_mm: float, rng: np.random.Generator) -> Iterator[tuple[str, float, float]]:
-    """Of every row the relative error of the depth, and its stated deviation."""
-    views = true_views(distance_mm, rng)
-    design = standard_layout("honeycomb", 6)
-    scale = PITCH_PX_MM * distance_mm / (900.0 / 40) / design.parameters["pitch_mm"]
-    layout = parse_layout(layout_to_json(design))
-    layout = replace(layout, xy_mm=layout.xy_mm * scale)
-    flat_mm = np.column_stack([layout.xy_mm, np.zeros(len(layout.xy_mm))])
-    half_mm = float(np.abs(layout.xy_mm).max())
-    dent = np.exp(-((layout.xy_mm / (0.4 * half_mm)) ** 2).sum(axis=1))
-    press_mm = flat_mm - PRESS_MM * np.outer(dent, [0.0, 0, 1])
-    rest, pressed = ([markers_of(layout, view, at, rng) for view in views] for at in (flat_mm, press_mm))
-    unit = rng.normal(size=13)
-    for known, (medium_sigma, focal_px, ways_mm, step_mm) in ROWS.items():
-        cov = np.diag(np.square([focal_px, focal_px, focal_px, focal_px, *[1e-4] * 5]))
-        cov[0, 1] = cov[1, 0] = focal_px**2 * 0.9999
-        lens = (
-            np.array([*views[0].focal_px, *views[0].centre_px, *DISTORTION])
-            + np.linalg.cholesky(cov) @ unit[:9]
-        )
-        medium = views[0].medium
-        assert medium is not None
-        stated = replace(
-            medium,
-            **{
-                name: getattr(medium, name) + s * u
-                for (name, s), u in zip(medium_sigma.items(), unit[9:], strict=False)
-            },
-        )
-        rig = Rig(
-            tuple(
-                View(view.name, (lens[0], lens[1]), (lens[2], lens[3]), tuple(lens[4:]), view.area_px, view.mirrored,
-                     medium=stated)
-                for view in views
-            ),
-            medium_sigma,
-        )  # fmt: skip
-        steps = {}
-        offset_mm = rng.normal(0, 0.05)
-        for way_mm in ways_mm:
-            plate = flat_mm * 1.01
-            plate[:, 2] = offset_mm - way_mm - rng.normal(0, step_mm)
-            steps[way_mm] = [markers_of(layout, view, plate, rng) for view in views]
-        found = calibrate_rig_markers(
-            layout, rig, [rest], steps, camera_cov=cov, step_sigma_mm=max(step_mm, 1e-4)
-        )
-        shape = Reconstructor(layout, found.rig, rest).reconstruct(pressed)
-        deep = dent > 0.5
-        error = (shape.displacement_mm[:, 2] + PRESS_MM * dent)[deep].mean() / (PRESS_MM * dent[deep].mean())
-        systematic = shape.displacement_systematic_mm[deep, 2].mean() / (PRESS_MM * dent[deep].mean())
-        noise_mm2 = shape.displacement_cov_mm2[deep, 2, 2].mean() / deep.sum()
-        stated_share = np.hypot(systematic, np.sqrt(noise_mm2) / (PRESS_MM * dent[deep].mean()))
-        yield known, float(error), float(stated_share)
+def by_this(sheet: Sheet, sightings: Sequence[Sighting]) -> Fitted:
+    """The camera of this solver, and the shape of the sheet."""
+    found = calibrate_points(sheet, sightings, SIZE_PX).adjusted
+    return Fitted(
+        found.camera, sheet.flat_mm + (sheet.bending @ found.guess.shape if found.problem.bent else 0.0)
+    )
 
 
-def measure(sensors: int = 60, seed: int = 0) -> Shown:
-    """One row for every state of knowledge at every distance.
+def placed_px(fitted: Fitted, one: Sighting) -> float:
+    """RMS of whole residuals of one view, px, after the pose that fits best."""
+    xyz_mm, rays = fitted.xyz_mm[one.ids], fitted.view.normalised(one.xy_px)
+    _, turn, shift = cv2.solvePnP(xyz_mm, rays, np.eye(3), None, flags=cv2.SOLVEPNP_ITERATIVE)
+    shown = fitted.view.at(np.asarray(cv2.Rodrigues(turn)[0]), shift.ravel()).project(xyz_mm)
+    return float(np.sqrt(np.mean(((shown - one.xy_px) ** 2).sum(axis=1))))
+
+
+def corners_text(path: Path) -> str:
+    """Residuals of all views of real corners, and of views left out; the largest; views that contradict."""
+    sheet, sightings = read_corners(path)
+    rational = cv2.CALIB_RATIONAL_MODEL
+    solvers: dict[str, Callable[[Sheet, Sequence[Sighting]], Fitted]] = {
+        "cv2.calibrateCamera,  5 coefficients": partial(by_opencv, 0, 5),
+        "cv2.calibrateCamera,  8 coefficients": partial(by_opencv, rational, 8),
+        "cv2.calibrateCamera, 12 coefficients": partial(by_opencv, rational | cv2.CALIB_THIN_PRISM_MODEL, 12),
+        "this solver": by_this,
+    }
+    lines = [
+        f"{len(sightings)} views: RMS of whole residuals, px; RMS and median of views left out of {FOLDS} fits; views "
+        "that the lens cannot show"
+    ]
+    for name, solve in solvers.items():
+        whole = solve(sheet, sightings)
+        inside = _rms(np.array([placed_px(whole, one) for one in sightings]))
+        left = np.zeros(len(sightings))
+        for fold in range(FOLDS):
+            part = solve(sheet, [one for i, one in enumerate(sightings) if i % FOLDS != fold])
+            left[fold::FOLDS] = [placed_px(part, one) for one in sightings[fold::FOLDS]]
+        lines.append(
+            f"  {name:36s} {inside:.3f}   {_rms(left):.3f}   {np.nanmedian(left):.3f}   {np.isnan(left).sum()}"
+        )
+    found = calibrate_points(sheet, sightings, SIZE_PX)
+    refused = [f"{one.name} ({one.cause})" for one in found.pictures if not one.used]
+    worst = sorted(found.pictures, key=lambda one: -one.scale)[:3]
+    lines.append("  largest: " + ", ".join(f"{one.name} {one.rms_px * 2**0.5:.2f} px" for one in worst))
+    lines.append(
+        f"  this solver: {found.model.name}, bent by {found.bend_mm:.3f} squares, {found.rms_px * 2**0.5:.3f} px"
+    )
+    return "\n".join([*lines, f"  left out: {', '.join(refused) or 'no view'}"])
+
+
+def measure(cameras: int = 8, seed: int = 0, condition: str = "", corners: str = "") -> Shown:
+    """Errors of rays of random cameras under each condition, and residuals of real corners.
 
     Args:
-        sensors: random sensors for each distance.
+        cameras: random cameras for each condition.
+        condition: one condition; all by default.
+        corners: file of real corners, as tests/support/calibration/wide.json.
     """
-    rows = []
-    for distance_mm in DISTANCES_MM:
-        pooled: dict[str, list[tuple[float, float]]] = {known: [] for known in ROWS}
-        for number in range(sensors):
-            rng = np.random.default_rng([seed, int(distance_mm), number])
-            for known, error, stated in depth_errors(distance_mm, rng):
-                pooled[known].append((error, stated))
-        for known, pairs in pooled.items():
-            error, stated = np.array(pairs).T
-            rms = float(np.sqrt(np.mean(error**2)))
-            below, deviation = np.quantile(np.abs(error), 0.95), np.sqrt(np.mean(stated**2))
-            z = float(np.sqrt(np.mean((error / stated) ** 2)))
-            rows.append(
-                (known, distance_mm, 100 * rms, 100 * below, 100 * deviation, 1e3 * rms * PRESS_MM, z)
-            )
-    columns = {"known": TEXT, "from mm": ".0f", "RMS %": ".2f", "95 % below": ".2f", "stated %": ".2f"}
-    yield Table(f"depth, {sensors} sensors for each distance", columns | {"RMS um": ".1f", "z": ".2f"}, rows)
+    if corners:
+        yield corners_text(Path(corners))
+    rows, kept = [], []
+    for name in ((condition,) if condition else CONDITIONS) if cameras else ():
+        found = [calibrate_one(name, seed, number) for number in range(cameras)]
+        kept += found
+        narrow = [row for row in found if row.field_deg <= WIDE_DEG]
+        wide = [row for row in found if row.field_deg > WIDE_DEG]
+        rows += [
+            pooled_row(f"{name}, {field}", some)
+            for field, some in (("to 100 degrees", narrow), ("beyond", wide))
+            if some
+        ]
+    columns = {
+        "condition": TEXT,
+        "cameras": "d",
+        "seen px": ".4f",
+        "stated px": ".4f",
+        "z": ".2f",
+        "image px": ".4f",
+    }
+    yield Table("rays", columns | {"bad found": TEXT, "good left out": "d", "CPU s": ".1f"}, rows)
+    return Found({"cameras": [asdict(row) for row in kept]})
 
 
-main = Experiment("rig", measure)
+main = Experiment("lenses", measure)
 
 if __name__ == "__main__":
     raise SystemExit(main())
