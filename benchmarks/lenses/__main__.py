@@ -3,7 +3,7 @@
 Random cameras of 40 to 120 degrees (1280x960), 20 pictures each, the whole reader and the search for the response
 included. "Seen" is the part of the image within the convex hull of all points; errors of rays are RMS per axis after a
 common turn, pooled over cameras; z is the RMS of errors over their covariances. "CPU" is the median of one call. With
-``--corners``, points of a chessboard as in tests/support/calibration are fitted, too, beside ``cv2.calibrateCamera``.
+``--corners``, points of a chessboard as in tests/support/calibration are fitted instead, beside ``cv2.calibrateCamera``.
 """
 
 from __future__ import annotations
@@ -198,12 +198,13 @@ def measure(cameras: int = 8, seed: int = 0, condition: str = "", corners: str =
     Args:
         cameras: random cameras for each condition.
         condition: one condition; all by default.
-        corners: file of real corners, as tests/support/calibration/wide.json.
+        corners: file of real corners, as tests/support/calibration/wide.json; then no random cameras.
     """
     if corners:
         yield corners_text(Path(corners))
+        return Found()
     rows, kept = [], []
-    for name in ((condition,) if condition else CONDITIONS) if cameras else ():
+    for name in (condition,) if condition else CONDITIONS:
         found = [calibrate_one(name, seed, number) for number in range(cameras)]
         kept += found
         narrow = [row for row in found if row.field_deg <= WIDE_DEG]
