@@ -198,7 +198,7 @@ def measure(cameras: int = 8, seed: int = 0, condition: str = "", corners: str =
     Args:
         cameras: random cameras for each condition.
         condition: one condition; all by default.
-        corners: file of real corners, as tests/support/calibration/wide.json; then no random cameras.
+        corners: file of real corners, as tests/support/calibration/wide.json; no cameras then.
     """
     if corners:
         yield corners_text(Path(corners))
