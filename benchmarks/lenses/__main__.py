@@ -3,7 +3,7 @@
 Random cameras of 40 to 120 degrees (1280x960), 20 pictures each, the whole reader and the search for the response
 included. "Seen" is the part of the image within the convex hull of all points; errors of rays are RMS per axis after a
 common turn, pooled over cameras; z is the RMS of errors over their covariances. "CPU" is the median of one call. With
-``--corners``, points of a chessboard as in tests/support/calibration are fitted instead, beside ``cv2.calibrateCamera``.
+``--corners``, corners of a chessboard, as tests/support/calibration are fitted beside ``cv2.calibrateCamera``.
 """
 
 from __future__ import annotations
