@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from extractor._native import layout as native
 
 QUADRATIC_TERMS = 6  # of a quadratic map: 1, x, y, x^2, xy, y^2 in units of the local edge
-LINEAR_TERMS = 3  # of a linear map: 1, x, y; both as in native/layout/neighbour_tables.hpp
+LINEAR_TERMS = 3  # of a linear map: 1, x, y
+LEAST_EIGENVALUE = 1e-7  # of the normal equations, a neighbour
 RING_STEPS = np.array(
     [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32
 )  # (18, 2) axial steps to the markers of the two rings
@@ -21,14 +22,13 @@ class NeighbourMapLimits(NamedTuple):
     """Limits of maps through the markers around a marker.
 
     Attributes:
-        min_pivot: of a Cholesky factor of the normal equations; below it the neighbours do not determine the map.
-            Chosen.
+        min_spread: least ratio of the neighbours' spread across to along; below it they lie on one line. Chosen.
         min_linear_neighbours: markers; fewer give no map. Derived: three coefficients, and one equation over.
         min_quadratic_neighbours: markers; fewer give the linear map. Derived: six coefficients, and three equations
             over.
     """
 
-    min_pivot: float = 1e-7
+    min_spread: float = 1e-3
     min_linear_neighbours: int = 4
     min_quadratic_neighbours: int = 9
 
@@ -61,7 +61,7 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     ):
         map_rows = rows[selected, :, :terms]
         gram = np.swapaxes(map_rows, 1, 2) @ map_rows
-        regular = np.linalg.eigvalsh(gram)[:, 0] > LIMITS.min_pivot * count[selected]
+        regular = np.linalg.eigvalsh(gram)[:, 0] > LEAST_EIGENVALUE * count[selected]
         solutions = np.linalg.solve(gram[regular], np.swapaxes(map_rows[regular], 1, 2))[:, 0]
         weights[np.flatnonzero(selected)[regular]] = solutions
     return weights

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from extractor._native import numbering as native
 from extractor.layout.lattice_tables import Lattice
-from extractor.localmap.affine_maps import LIMITS as MAP_LIMITS
-from extractor.localmap.affine_maps import AffineMapLimits
 from extractor.numbering.missing_cells import NumberedTriangles
 
 
@@ -23,13 +21,19 @@ class CornerLimits(NamedTuple):
         max_agreed_spread: in the triangle's shortest edge, between a corner and the mean of its marker's corners, where
             these agree. Chosen.
         predicted_weight: of a predicted corner, relative to a corner of a fitted triangle. Chosen.
-        maps: limits of the maps that predict corners.
+        min_spread: least ratio of a cell's neighbours' spread across to along; below it they lie on one line. Chosen.
+        max_triangle_misfit: of the distance to a neighbour, from its center to the prediction by the cell's triangle.
+            Measured: rule "mapped by triangle".
+        min_rival_misfit: the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances. Chosen
+            below that.
     """
 
     max_corner_misfit: float = 0.28
     max_agreed_spread: float = 0.2
     predicted_weight: float = 0.05
-    maps: AffineMapLimits = MAP_LIMITS
+    min_spread: float = 0.2
+    max_triangle_misfit: float = 0.3
+    min_rival_misfit: float = 0.8
 
 
 LIMITS = CornerLimits()

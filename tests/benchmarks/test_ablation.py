@@ -65,9 +65,7 @@ def test_a_rules_text_occurs_once_and_leaves_a_file_without_it(rule: Rule) -> No
 def test_rules_are_told_apart_by_name() -> None:
     assert len({rule.name for rule in RULES}) == len(RULES)
     assert {rule.kind for rule in RULES} == {"accuracy", "errors and time", "no wrong id"}
-    assert {rule.stage for rule in RULES} == {
-        *("pipeline", "cells", "numbering", "localmap", "refine", "complete")
-    }
+    assert {rule.stage for rule in RULES} == {*("pipeline", "cells", "numbering", "refine", "complete")}
 
 
 def test_a_text_that_occurs_twice_or_never_is_refused() -> None:

@@ -9,9 +9,9 @@ PLACES = (
         "mapped by triangle",
         "a cell with too few neighbours has the map of its triangle",
         "accuracy",
-        "extractor/localmap/affine_maps.py",
-        "max_misfit: float = 0.3",
-        "max_misfit: float = 0.0",
+        "extractor/numbering/marker_places.py",
+        "max_triangle_misfit: float = 0.3",
+        "max_triangle_misfit: float = 0.0",
     ),
     Rule(
         "corner misfit",

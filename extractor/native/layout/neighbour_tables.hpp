@@ -5,21 +5,16 @@
 
 namespace cmp::layout {
 
-// As in extractor/layout/neighbour_tables.py:
-inline constexpr Index QUADRATIC_TERMS =
-    6;  // of a quadratic map: 1, x, y, x^2, xy, y^2 in units of the local edge
-inline constexpr Index RIGHT_SIDES = 3;    // of its normal equations: x, y and the leverage
-inline constexpr Index LINEAR_TERMS = 3;   // of a linear map: 1, x, y
 inline constexpr Index RING_MARKERS = 18;  // in two rings
 
 // Limits of maps through neighbours; explained in extractor/layout/neighbour_tables.py.
 struct NeighbourMapLimits {
-  double min_pivot;
+  double min_spread;
   Index min_linear_neighbours, min_quadratic_neighbours;
 
   template <class F>
   static NeighbourMapLimits read(const F& f) {
-    return {f["min_pivot"], f["min_linear_neighbours"], f["min_quadratic_neighbours"]};
+    return {f["min_spread"], f["min_linear_neighbours"], f["min_quadratic_neighbours"]};
   }
 };
 

@@ -2,7 +2,6 @@
 #include "base/binding.hpp"
 
 #include "localmap/neighbour_prediction.hpp"
-#include "localmap/regularised_maps.hpp"
 
 namespace cmp::localmap {
 
@@ -22,8 +21,6 @@ predict(View<const double, 2> xy_px, View<const double, 1> noise_px2, View<const
 
 void add_localmap(nb::module_ module) {
   bind<&predict>(module, "predict_markers", {"xy_px", "noise_px2", "wanted", "marker_mm", "table", "limits"});
-  bind<&fill_quadratic_derivatives>(module, "fill_quadratic_derivatives",
-                                    {"xy", "markers", "ring_markers", "ring_vectors", "out", "limits"});
 }
 
 }  // namespace cmp::localmap

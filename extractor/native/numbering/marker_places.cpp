@@ -1,8 +1,10 @@
 #include "numbering/marker_places.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "localmap/local_map.hpp"
 #include "numbering/plane_point.hpp"
 
 namespace cmp::numbering {
@@ -91,6 +93,105 @@ Triangle predicted_triangle(const MappedCells& cells, Index i, View<const double
   return out;
 }
 
+using Map = localmap::LocalMap<1>;
+
+// Writes the slope (2, 2) of a map, px per mm.
+void fill_slope(const Map& map, View<double, 2> out) {
+  for (int axis = 0; axis < 2; ++axis)
+    for (int k = 0; k < 2; ++k) out(axis, k) = map.coefficients(axis)[k + 1];
+}
+
+// The linear maps around numbered cells, through their centers.
+class CellMaps {
+ public:
+  CellMaps(const TriangularCells& cells, const CellNumbers& numbers, const layout::LayoutCells& layout,
+           const CornerLimits& limits)
+      : cells_(cells),
+        cell_(numbers.cell),
+        corner_step_(numbers.mirrored ? 1 : 2),
+        layout_(layout),
+        limits_(limits),
+        image_cell_({layout.center_mm.size()}, -1) {
+    for (Index i = 0; i < cell_.size(); ++i)
+      if (cell_[i] >= 0) image_cell_[cell_[i]] = static_cast<std::int32_t>(i);
+  }
+
+  // (N, 2, 2) px per mm: by the six cells around, or at the rims of holes, where these are too few, by the
+  // cell's triangle, if a neighbour shows which of its corners is which; NaN without either.
+  //
+  // The millimetres of the layout contain the pattern's own shape, so a round pattern is no more curved than
+  // a honeycomb.
+  Array<double, 3> slopes() const {
+    Array<double, 3> out({cell_.size(), 2, 2}, NOWHERE);
+    for (Index i = 0; i < cell_.size(); ++i) {
+      if (cell_[i] < 0) continue;
+      Map map = empty_map(i);
+      for_neighbours(i, [&](std::int32_t v, Index j) {
+        map.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), cells_.center_px(j, 0),
+                cells_.center_px(j, 1));
+      });
+      if (map.solve(PINNED, limits_.min_spread))
+        fill_slope(map, out.view()[i]);
+      else if (!std::isnan(cells_.corner_px(i, 0, 0)))
+        fill_by_triangle(i, out.view()[i]);
+    }
+    return out;
+  }
+
+ private:
+  static constexpr localmap::MapRidge PINNED{.constant = localmap::RIGID};
+
+  Map empty_map(Index i) const {
+    const std::int32_t u = cell_[i];
+    return Map({layout_.center_mm(u, 0), layout_.center_mm(u, 1), 1.0, cells_.center_px(i, 0),
+                cells_.center_px(i, 1), 1.0});
+  }
+  template <class Visit>
+  void for_neighbours(Index i, Visit visit) const {
+    for (const std::int32_t v : layout_.cell_neighbours[cell_[i]])
+      if (v >= 0 && image_cell_[v] >= 0) visit(v, Index{image_cell_[v]});
+  }
+  // The map that carries a cell's corners onto its triangle, whose corner `first` is corner 0.
+  Map map_by_triangle(Index i, Index first) const {
+    Map map = empty_map(i);
+    for (int k = 0; k < 3; ++k) {
+      const std::int32_t u = cell_[i];
+      const Index corner = (first + corner_step_ * k) % 3;
+      map.add(layout_.center_mm(u, 0) + layout_.corner_vectors_mm(u, k, 0),
+              layout_.center_mm(u, 1) + layout_.corner_vectors_mm(u, k, 1), cells_.corner_px(i, corner, 0),
+              cells_.corner_px(i, corner, 1));
+    }
+    map.solve(PINNED, 0.0);
+    return map;
+  }
+  // The largest distance from a neighbour to its prediction, over that to the cell; 0 without a neighbour.
+  double misfit_of(Index i, const Map& map) const {
+    double misfit = 0.0;
+    for_neighbours(i, [&](std::int32_t v, Index j) {
+      const double x = cells_.center_px(j, 0), y = cells_.center_px(j, 1);
+      const auto [px, py] = map.at(layout_.center_mm(v, 0), layout_.center_mm(v, 1));
+      misfit = std::max(misfit, std::hypot(px - x, py - y) /
+                                    std::hypot(x - cells_.center_px(i, 0), y - cells_.center_px(i, 1)));
+    });
+    return misfit;
+  }
+  void fill_by_triangle(Index i, View<double, 2> out) const {
+    std::array<double, 3> misfit;
+    for (Index first = 0; first < 3; ++first) misfit[first] = misfit_of(i, map_by_triangle(i, first));
+    const Index best = std::min_element(misfit.begin(), misfit.end()) - misfit.begin();
+    const double rival = std::min(misfit[(best + 1) % 3], misfit[(best + 2) % 3]);
+    if (misfit[best] < limits_.max_triangle_misfit && rival > limits_.min_rival_misfit)
+      fill_slope(map_by_triangle(i, best), out);
+  }
+
+  const TriangularCells& cells_;
+  View<const std::int32_t, 1> cell_;
+  int corner_step_;  // clockwise in the image a cell's corners run 0, 2, 1, from the back 0, 1, 2
+  const layout::LayoutCells& layout_;
+  const CornerLimits& limits_;
+  Array<std::int32_t, 1> image_cell_;
+};
+
 // (M, 4) the weighted sums of x, y and edge, and of the weights, at each marker.
 Array<double, 2> corner_sums(const CellCorners& corners, Index count, double predicted_weight) {
   Array<double, 2> out({count, 4}, 0.0);
@@ -168,8 +269,7 @@ CellCorners cell_corners(const MappedCells& cells, View<const double, 3> vectors
 InitialMarkers merge_corners(const TriangularCells& cells, const CellNumbers& numbers,
                              const layout::LayoutCells& layout, View<const std::int32_t, 2> corner_ids,
                              Index markers, const CornerLimits& limits) {
-  const Array<double, 3> slope = localmap::completed_linear_maps(
-      cells.center_px, cells.corner_px, numbers.cell, numbers.mirrored, layout, limits.maps);
+  const Array<double, 3> slope = CellMaps(cells, numbers, layout, limits).slopes();
   const CellCorners corners =
       cell_corners({cells.center_px, cells.corner_px, slope, numbers.cell, numbers.mirrored},
                    layout.corner_vectors_mm, corner_ids, limits);

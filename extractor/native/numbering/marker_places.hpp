@@ -5,7 +5,6 @@
 
 #include "base/array.hpp"
 #include "layout/lattice_tables.hpp"
-#include "localmap/affine_maps.hpp"
 
 namespace cmp::numbering {
 
@@ -17,11 +16,12 @@ inline constexpr double MAX_PLACE_ERROR = 0.1;
 // Limits of corners; explained in extractor/numbering/marker_places.py.
 struct CornerLimits {
   double max_corner_misfit, max_agreed_spread, predicted_weight;
-  localmap::AffineMapLimits maps;
+  double min_spread, max_triangle_misfit, min_rival_misfit;
 
   template <class F>
   static CornerLimits read(const F& f) {
-    return {f["max_corner_misfit"], f["max_agreed_spread"], f["predicted_weight"], f["maps"]};
+    return {f["max_corner_misfit"], f["max_agreed_spread"],   f["predicted_weight"],
+            f["min_spread"],        f["max_triangle_misfit"], f["min_rival_misfit"]};
   }
 };
 

@@ -8,8 +8,7 @@ namespace cmp::numbering {
 
 namespace {
 
-using localmap::LocalMap;
-using localmap::MappedPoint;
+constexpr double MIN_SPREAD = 1e-3;  // of the known cells
 
 // The known cells around a cell of the layout: its neighbours, and theirs.
 std::vector<std::int32_t> known_around(std::int32_t u, View<const std::int32_t, 1> image_cell,
@@ -52,17 +51,16 @@ std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const do
     if (known.empty()) continue;
     const Index first = image_cell[known[0]];
     const double x_mm = layout.center_mm(known[0], 0), y_mm = layout.center_mm(known[0], 1);
-    LocalMap map({x_mm, y_mm, layout.size_mm[u], center(first, 0), center(first, 1), 1.0}, limits.prior);
+    localmap::LocalMap<3> map({x_mm, y_mm, layout.size_mm[u], center(first, 0), center(first, 1), 1.0});
     for (const std::int32_t v : known)
       map.add(layout.center_mm(v, 0), layout.center_mm(v, 1), center(image_cell[v], 0),
               center(image_cell[v], 1));
-    if (!map.solve()) continue;
+    if (known.size() < 3 || !map.solve(limits.prior.ridge(), MIN_SPREAD)) continue;
     found.push_back(static_cast<std::int32_t>(u));
     for (int k = 0; k < 3; ++k) {
-      const MappedPoint point = map.at(layout.center_mm(u, 0) + layout.corner_vectors_mm(u, k, 0),
-                                       layout.center_mm(u, 1) + layout.corner_vectors_mm(u, k, 1));
-      corners.push_back(point.x);
-      corners.push_back(point.y);
+      for (const double place : map.at(layout.center_mm(u, 0) + layout.corner_vectors_mm(u, k, 0),
+                                       layout.center_mm(u, 1) + layout.corner_vectors_mm(u, k, 1)))
+        corners.push_back(place);
     }
   }
   const auto number = static_cast<Index>(found.size());

@@ -5,13 +5,13 @@
 
 #include "base/array.hpp"
 #include "layout/lattice_tables.hpp"
-#include "localmap/local_map.hpp"
+#include "numbering/map_prior.hpp"
 
 namespace cmp::numbering {
 
 // The limits of predictions; the Python module explains them.
 struct MissingCellLimits {
-  localmap::MapPrior prior;
+  MapPrior prior;
   std::int64_t min_neighbours;
 
   template <class F>

@@ -12,9 +12,10 @@ namespace cmp::numbering {
 
 namespace {
 
-using localmap::LocalMap;
 using localmap::MapFrame;
-using localmap::MappedPoint;
+using Map = localmap::LocalMap<3>;
+
+constexpr double MIN_SPREAD = 1e-3;  // of placed cells
 
 // The cells that are placed, with a grid of their places.
 class PlacedCells {
@@ -56,8 +57,8 @@ class PlacedCells {
 
 // The map through the placed cells around a part.
 struct Support {
-  LocalMap map;
-  LocalMap stiff;  // the same with little bending, to look for places across a gap
+  Map map;
+  Map stiff;  // the same with little bending, to look for places across a gap
   double edge_px;
   double misfit;      // of the placed cells alone
   std::int32_t near;  // the layout's cell of the nearest placed cell
@@ -183,16 +184,15 @@ class Attachment {
     const double edge_px = edge_of(placed.of_image(near[0]));
     const MapFrame frame{layout_.center_mm(u, 0), layout_.center_mm(u, 1), layout_.size_mm[u],
                          placed.x(near[0]),       placed.y(near[0]),       edge_px};
-    const localmap::MapPrior stiff{limits_.prior.noise, limits_.prior.quadratic * limits_.stiffness,
-                                   limits_.prior.cubic * limits_.stiffness};
-    Support out{LocalMap(frame, limits_.prior), LocalMap(frame, stiff), edge_px, 0.0,
-                static_cast<std::int32_t>(u)};
+    Support out{Map(frame), Map(frame), edge_px, 0.0, static_cast<std::int32_t>(u)};
     for (const Index n : near) {
       const Index v = placed.of_layout(n);
       out.map.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
       out.stiff.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
     }
-    if (!out.map.solve() || !out.stiff.solve()) return std::nullopt;
+    if (near.size() < 3 || !out.map.solve(limits_.prior.ridge(), MIN_SPREAD) ||
+        !out.stiff.solve(limits_.prior.ridge(limits_.stiffness), MIN_SPREAD))
+      return std::nullopt;
     out.misfit = out.map.misfit();
     return out;
   }
@@ -228,14 +228,14 @@ class Attachment {
   }
   // In edges, how far around a place of the map others are tried.
   double reach_at(const Support& support, std::int32_t u) const {
-    const MappedPoint point = support.map.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
+    const double leverage = support.map.leverage(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
     return std::min(limits_.reach,
-                    1.0 + limits_.reach_deviations * std::sqrt(point.variance) / support.edge_px);
+                    1.0 + limits_.reach_deviations * limits_.prior.noise * std::sqrt(1.0 + leverage));
   }
   // From the place of a layout's cell by the stiff map to a cell of the image, in edges.
   double distance_to(const Support& support, std::int32_t u, Index i) const {
-    const MappedPoint point = support.stiff.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
-    return std::hypot(point.x - x(i), point.y - y(i)) / support.edge_px;
+    const auto [px, py] = support.stiff.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
+    return std::hypot(px - x(i), py - y(i)) / support.edge_px;
   }
   Motion motion_to(Index i, std::int32_t u, std::int32_t turn) const {
     const AxialStep turned = turned_up({cells_.axial(i, 0), cells_.axial(i, 1)}, turn);
@@ -248,7 +248,7 @@ class Attachment {
   // The log odds of a motion: how much more a map through both sides must bend, and the inks.
   double score_of(const std::vector<Index>& part, const std::vector<Index>& judged, const Support& support,
                   const Motion& motion) const {
-    LocalMap map = support.map;
+    Map map = support.map;
     double score = 0.0;
     for (const Index i : part) {
       const std::int32_t u = moved(i, motion);
@@ -260,20 +260,20 @@ class Attachment {
       map.add(layout_.center_mm(u, 0), layout_.center_mm(u, 1), x(i), y(i));
       score += odds_(i, layout_.ink[u] - 1);
     }
-    if (!map.solve()) return -1e9;
+    if (!map.solve(limits_.prior.ridge(), MIN_SPREAD)) return -1e9;
     for (const Index i : judged) {
       const std::int32_t u = moved(i, motion);
       if (u >= 0 && !is_taken_[u] && !is_pointing(i, u, map, support.edge_px)) score += limits_.outside_odds;
     }
-    return score - 0.5 * (map.misfit() - support.misfit);
+    return score - 0.5 * (map.misfit() - support.misfit) / (limits_.prior.noise * limits_.prior.noise);
   }
   // Whether the triangle points as the layout's cell does by the map.
-  bool is_pointing(Index i, std::int32_t u, const LocalMap& map, double edge_px) const {
+  bool is_pointing(Index i, std::int32_t u, const Map& map, double edge_px) const {
     std::array<double, 6> expected;
     for (int k = 0; k < 3; ++k) {
-      const MappedPoint point = map.at(layout_.center_mm(u, 0) + layout_.corner_vectors_mm(u, k, 0),
-                                       layout_.center_mm(u, 1) + layout_.corner_vectors_mm(u, k, 1));
-      expected[2 * k] = point.x - x(i), expected[2 * k + 1] = point.y - y(i);
+      const auto [px, py] = map.at(layout_.center_mm(u, 0) + layout_.corner_vectors_mm(u, k, 0),
+                                   layout_.center_mm(u, 1) + layout_.corner_vectors_mm(u, k, 1));
+      expected[2 * k] = px - x(i), expected[2 * k + 1] = py - y(i);
     }
     for (int first = 0; first < 3; ++first) {
       double most = 0.0;

@@ -3,14 +3,14 @@
 
 #include "base/array.hpp"
 #include "layout/lattice_tables.hpp"
-#include "localmap/local_map.hpp"
 #include "numbering/ink_fields.hpp"
+#include "numbering/map_prior.hpp"
 
 namespace cmp::numbering {
 
 // The limits of attachment; the Python module explains them.
 struct AttachmentLimits {
-  localmap::MapPrior prior;
+  MapPrior prior;
   std::int64_t known_cells, judged_cells, max_rounds;
   double stiffness, reach, reach_deviations, max_corner_misfit, max_misfit, outside_odds, margin,
       margin_of_misfit;

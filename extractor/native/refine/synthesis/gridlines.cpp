@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "localmap/local_map.hpp"
+
 namespace cmp::refine {
 
 namespace {
@@ -26,6 +28,37 @@ void fill_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t
   for (Index d = 0; d < DERIVATIVES; ++d) {
     out(0, d) = to_x[d];
     out(1, d) = to_y[d];
+  }
+}
+
+// Writes the map (2, 5) at marker m through the known ones of `near` (K,) at `offset` (K, 2), if these
+// determine it.
+void fill_quadratic_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
+                                View<const double, 2> offset, View<double, 2> out,
+                                const GridlineLimits& limits) {
+  localmap::LocalMap<2> map({0.0, 0.0, 1.0, xy(m, 0), xy(m, 1), 1.0});
+  Index known = 0;
+  for (Index k = 0; k < near.size(); ++k) {
+    const Index n = near[k];
+    if (n < 0 || !std::isfinite(xy(n, 0))) continue;
+    const double u = offset(k, 0), v = offset(k, 1), square = u * u + v * v;
+    map.add(u, v, xy(n, 0), xy(n, 1), 1.0 / (square * square));
+    ++known;
+  }
+  if (known < limits.min_neighbours) return;
+  double ridge = localmap::RIGID;
+  if (known >= limits.min_curved_neighbours)
+    ridge = known >= limits.min_firm_neighbours ? limits.firm_ridge : limits.weak_ridge;
+  // of the second derivatives, of which the terms u^2 and v^2 have half
+  if (!map.solve({.constant = localmap::RIGID, .square = 4.0 * ridge, .mixed = ridge}, limits.min_spread))
+    return;
+  for (int axis = 0; axis < 2; ++axis) {
+    const auto& terms = map.coefficients(axis);
+    out(axis, 0) = terms[1];
+    out(axis, 1) = terms[2];
+    out(axis, 2) = 2.0 * terms[3];
+    out(axis, 3) = terms[4];
+    out(axis, 4) = 2.0 * terms[5];
   }
 }
 
@@ -72,19 +105,16 @@ Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> whi
                                View<const std::int32_t, 2> near, View<const double, 3> offset,
                                View<const double, 3> stencil, const GridlineLimits& limits) {
   Array<double, 3> maps({xy.size(), 2, 5}, NOT_A_NUMBER);
-  Array<std::int64_t, 1> incomplete({xy.size()});
   const auto out = maps.view();
-  Index count = 0;
   for (Index m = 0; m < xy.size(); ++m) {
     if (!which[m]) continue;
     const bool has_stencil = stencil(m, 0, 0) != 0.0 || stencil(m, 0, 1) != 0.0;
     if (has_stencil) fill_derivatives(xy, m, near[m], stencil[m], out[m]);
     if (!std::isfinite(out(m, 0, 0))) {
       out[m].fill(NOT_A_NUMBER);
-      incomplete[count++] = m;
+      fill_quadratic_derivatives(xy, m, near[m], offset[m], out[m], limits);
     }
   }
-  localmap::fill_quadratic_derivatives(xy, incomplete.slice(0, count), near, offset, out, limits.maps);
   return maps;
 }
 

@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "base/array.hpp"
-#include "localmap/regularised_maps.hpp"
 
 namespace cmp::refine {
 
@@ -23,7 +22,14 @@ inline constexpr Index FIRST_RING = 6;
 struct GridlineLimits {
   double max_slope = 0.5;  // of a gridline against its chord; a larger slope is an error of the map. Chosen.
   double min_length_px = 1.0;  // px, of the chord; no shorter gridline is known. Chosen.
-  localmap::RegularisedMapLimits maps;
+  // of the neighbours of an incomplete ring, across to along; below it they lie on one line. Chosen.
+  double min_spread = 0.2;
+  Index min_neighbours = 2;         // fewer do not determine the slopes. Derived: two slopes.
+  Index min_curved_neighbours = 5;  // with fewer the map is linear. Derived: five derivatives.
+  Index min_firm_neighbours = 8;    // with fewer the curvature is held by weak_ridge. Chosen.
+  // added to the diagonal of the second derivatives' normal equations with enough neighbours and with few;
+  // the unit is that of the layout's vectors. Chosen.
+  double firm_ridge = 0.001, weak_ridge = 0.02;
 };
 
 // Markers (M, 2) px with predictions, and (M,) the predicted ones.
