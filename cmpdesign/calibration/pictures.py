@@ -1,4 +1,9 @@
-"""From pictures of a sheet to its points in them, through the reader."""
+"""From pictures of a sheet to its points in them, through the reader.
+
+Markers of the pattern's border are left out. Around an inner marker the cells lie evenly, so that errors of blur, of
+the tone curve and of a JPEG's coarser colors cancel. A border marker has cells to one side: these errors move all of
+them outwards or inwards, which no camera tells from another lens, and no covariance of single markers states.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +44,7 @@ def read_sheets(
     extractor: Extractor,
     watch: Callable[[int, int], None],
 ) -> SheetPictures:
-    """Read pictures of a sheet; only markers that are measured count.
+    """Read pictures of a sheet; only inner markers that are measured count.
 
     Raises:
         CmpDesignError: pictures of different sizes.
@@ -50,16 +55,26 @@ def read_sheets(
         raise CmpDesignError(
             f"the pictures have {len(sizes)} sizes ({found} px); a calibration holds for one; calibrate each alone"
         )
-    sightings, unread = [], {}
+    sightings, unread, inner = [], {}, inner_markers(reference)
     for number, (picture, name) in enumerate(zip(pictures, names, strict=True)):
         markers = extractor.extract(picture)
         good = np.flatnonzero(
-            (markers.status == Status.MEASURED) & np.isfinite(markers.cov_px2).all(axis=(1, 2))
+            inner & (markers.status == Status.MEASURED) & np.isfinite(markers.cov_px2).all(axis=(1, 2))
         )
         if len(good) < MIN_POINTS:
-            unread[name] = str(markers.reason) if markers.reason else f"{len(good)} markers measured"
+            unread[name] = str(markers.reason) if markers.reason else f"{len(good)} inner markers measured"
         else:
             sightings.append(Sighting(name, good, markers.xy_px[good], markers.cov_px2[good]))
         watch(number + 1, len(pictures))
     size_px = sizes.pop() if sizes else (0, 0)
     return SheetPictures(Sheet(reference.xy_mm), tuple(sightings), unread, size_px)
+
+
+def inner_markers(reference: Reference) -> NDArray[np.bool_]:
+    """(M,) bool, the markers with cells all around: no side of a cell at them belongs to one cell alone."""
+    corners = reference.cell_corners
+    sides = np.sort(np.stack([corners, np.roll(corners, 1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    found, counts = np.unique(sides, axis=0, return_counts=True)
+    inner = np.ones(len(reference.xy_mm), bool)
+    inner[found[counts == 1]] = False
+    return inner
