@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cmpdesign import Design, build_layout
 from extractor import Reference
-from extractor.layout.lattice_tables import Lattice, lattice_of
+from extractor.layout.lattice_tables import Lattice, cells_at, lattice_of
 from extractor.numbering.code_bits import STEPS_BESIDE
 from extractor.numbering.ink_fields import LIMITS, InkFields, Palette
 from extractor.numbering.lattice_walk import WalkedCells
@@ -32,12 +32,29 @@ LATTICE_STEPS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
 
 @dataclass(frozen=True, eq=False)
 class Pad:
-    """A coded pad: its lattice, its down-cells (D, 2), and which of them are white (D,)."""
+    """A coded pad.
+
+    Attributes:
+        lattice: its lattice, with U cells.
+        registration: registers parts with the pad.
+        place: (U, 2), the cells' places, in edges.
+        down: (D, 2), its down-cells.
+        down_place: (D, 2), their places, in edges.
+        beside: (D, 3), the cells at their sides, U for none.
+        is_white: (D,), which of them are white.
+    """
 
     lattice: Lattice
     registration: Registration
+    place: NDArray[np.float64]
     down: NDArray[np.int32]
+    down_place: NDArray[np.float64]
+    beside: NDArray[np.int32]
     is_white: NDArray[np.bool_]
+
+    def down_cells_of(self, part: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(D,) the down-cells that share a side with cells of a part (U,)."""
+        return np.asarray(np.append(part, False)[self.beside].any(axis=1))
 
 
 def pad_of(layers: int, code: int) -> Pad:
@@ -45,10 +62,19 @@ def pad_of(layers: int, code: int) -> Pad:
     reference = build_layout(design).reference()
     assert isinstance(reference, Reference)
     lattice = lattice_of(reference)
-    registration = Registration(lattice, Palette(dict(reference.palette)), False)
+    registration = Registration([lattice], Palette(dict(reference.palette)), False)
     down = np.unique((lattice.axial[:, None] - STEPS_BESIDE).reshape(-1, 2), axis=0).astype(np.int32)
     is_white = (down[:, None] == lattice.white_axial).all(axis=2).any(axis=1)
-    return Pad(lattice, registration, down, is_white)
+    beside = cells_at((down[:, None] + STEPS_BESIDE).reshape(-1, 2), lattice).reshape(-1, 3)
+    return Pad(
+        lattice=lattice,
+        registration=registration,
+        place=lattice.axial @ LATTICE_STEPS,
+        down=down,
+        down_place=down @ LATTICE_STEPS,
+        beside=np.where(beside < 0, len(lattice.axial), beside),
+        is_white=is_white,
+    )
 
 
 def chosen_part(places: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.bool_]:
@@ -88,12 +114,6 @@ def moved(axial: NDArray[np.int32], motion: NDArray[np.integer], up: bool) -> ND
     return np.ascontiguousarray(axial + motion[1:], dtype=np.int32)
 
 
-def down_cells_of(pad: Pad, places: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(D,) the pad's down-cells that share a side with cells (P, 2)."""
-    beside = (pad.down[:, None] + STEPS_BESIDE)[:, :, None]
-    return np.asarray((beside == places).all(axis=-1).any(axis=(1, 2)))
-
-
 def seen_part(
     places: NDArray[np.int32],
     down: NDArray[np.int32],
@@ -128,12 +148,13 @@ def random_motion(rng: np.random.Generator) -> NDArray[np.int64]:
 
 def judged(pads: list[Pad], rng: np.random.Generator) -> tuple[str, str, float]:
     """One part: its group, the verdict, and the milliseconds; a third of the parts is of another pad."""
-    code, other = rng.choice(len(pads), 2, replace=False)
+    code = int(rng.integers(len(pads)))
+    other = (code + int(rng.integers(1, len(pads)))) % len(pads)
     is_own = rng.random() < 2 / 3
     pad = pads[code]
-    places = pad.lattice.axial[chosen_part(pad.lattice.axial @ LATTICE_STEPS, rng)]
-    near = down_cells_of(pad, places)
-    whiteness = abused_whiteness(pad.is_white[near], pad.down[near] @ LATTICE_STEPS, rng)
+    part = chosen_part(pad.place, rng)
+    places, near = pad.lattice.axial[part], pad.down_cells_of(part)
+    whiteness = abused_whiteness(pad.is_white[near], pad.down_place[near], rng)
     bits = int(np.isfinite(whiteness).sum())
     group = next((name for name, (low, high) in GROUPS.items() if low <= bits < high), "")
     if not group:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from extractor.numbering.ink_fields import InkFields
 
 STEPS_BESIDE = np.array([[0, 0], [-1, 0], [-1, 1]])  # from a down-cell to the up-cells that share its sides
-MAX_AXIAL = 1 << 16  # more than any axial coordinate of an image
 
 
 class CodeLimits(NamedTuple):
@@ -60,7 +59,7 @@ class CodeBits(NamedTuple):
     @staticmethod
     def of(fields: InkFields, axial: NDArray[np.int32]) -> CodeBits:
         """The bits of a part with the cells (P, 2). A bright place that is no triangle is unknown: glare or dirt."""
-        beside = np.isin(_key(fields.down_axial[:, None] + STEPS_BESIDE), _key(axial)).sum(axis=1)
+        beside = _cells_beside(fields.down_axial, axial)
         white = fields.is_triangle
         black = (fields.whiteness < LIMITS.dark) & (beside >= LIMITS.cells_beside)
         odds = np.where(white, LIMITS.wrong_bit, np.where(black, -LIMITS.wrong_bit, np.nan))
@@ -85,6 +84,11 @@ class CodeBits(NamedTuple):
         return LIMITS.wrong_bit * (LIMITS.lead_bits + LIMITS.lead_share * self.known)
 
 
-def _key(axial: NDArray[np.integer]) -> NDArray[np.int64]:
-    """(...,) one number for each place (..., 2)."""
-    return np.asarray(axial[..., 0].astype(np.int64) * MAX_AXIAL + axial[..., 1])
+def _cells_beside(down_axial: NDArray[np.int32], axial: NDArray[np.int32]) -> NDArray[np.int64]:
+    """(D,) number of the cells (P, 2) that share a side with each down-cell (D, 2)."""
+    low = np.minimum(axial.min(axis=0), down_axial.min(axis=0, initial=0)) - 1
+    shape = np.maximum(axial.max(axis=0), down_axial.max(axis=0, initial=0)) - low + 2
+    is_cell = np.zeros(shape, np.bool_)
+    is_cell[tuple((axial - low).T)] = True
+    beside = down_axial[:, None] + STEPS_BESIDE - low
+    return np.asarray(is_cell[beside[..., 0], beside[..., 1]].sum(axis=1))

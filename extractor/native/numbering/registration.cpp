@@ -1,6 +1,9 @@
 #include "numbering/registration.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "layout/lattice_tables.hpp"
@@ -25,6 +28,7 @@ Extent trimmed_extent(const std::vector<AxialStep>& places, int axis, double sha
 }
 
 struct ScoredMotion {
+  std::int32_t pad;
   Motion motion;
   double score;
   double white;
@@ -63,6 +67,28 @@ std::int64_t count_inside(const std::vector<AxialStep>& places, std::int32_t dq,
   return static_cast<std::int64_t>(places.size()) - outside;
 }
 
+// The best motions, the best first; of equal ones the first.
+Motions best_motions(std::vector<ScoredMotion> found, Index most) {
+  const Index count = std::min<Index>(static_cast<Index>(found.size()), most);
+  std::vector<Index> order(found.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::partial_sort(order.begin(), order.begin() + count, order.end(), [&](Index a, Index b) {
+    return found[a].score > found[b].score || (found[a].score == found[b].score && a < b);
+  });
+  Array<std::int32_t, 2> motions({count, 3});
+  Array<std::int32_t, 1> pads({count});
+  Array<double, 1> scores({count}), odds({count});
+  for (Index k = 0; k < count; ++k) {
+    const ScoredMotion& one = found[order[k]];
+    motions(k, 0) = one.motion.turn, motions(k, 1) = one.motion.dq, motions(k, 2) = one.motion.dr;
+    pads[k] = one.pad, scores[k] = one.score, odds[k] = one.white;
+  }
+  double without_white = -std::numeric_limits<double>::infinity();
+  for (std::size_t n = 1; n < order.size(); ++n)
+    without_white = std::max(without_white, found[order[n]].score - found[order[n]].white);
+  return {std::move(motions), std::move(pads), std::move(scores), std::move(odds), without_white};
+}
+
 }  // namespace
 
 Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> naming,
@@ -79,6 +105,7 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
   std::array<Extent, 3> allowed;
   for (int axis = 0; axis < 3; ++axis) allowed[axis] = trimmed_extent(of_layout, axis, 0.0);
   std::vector<ScoredMotion> found;
+  std::vector<double> odds(static_cast<std::size_t>(layout.white_pad[layout.white_pad.size() - 1]) + 1);
   for (std::int32_t turn = 0; turn < TURNS; ++turn) {
     std::vector<AxialStep> turned;
     for (const AxialStep& a : cells) turned.push_back(turned_up(a, turn));
@@ -90,26 +117,18 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
         const std::int64_t inside = count_inside(turned, dq, dr, most, layout.cell_lookup);
         if (inside < 0) continue;
         const Motion motion{turn, dq, dr};
-        double odds = 0.0;
+        std::fill(odds.begin(), odds.end(), 0.0);
         for (Index w = 0; w < layout.white_axial.size(); ++w)
-          odds += whites.at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
+          odds[layout.white_pad[w]] +=
+              whites.at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
-        const double outside = static_cast<double>(axial.size() - inside);
-        found.push_back(
-            {motion, naming[((shift % 3) + 3) % 3] + odds - limits.outside_weight * outside, odds});
+        const double others = naming[((shift % 3) + 3) % 3] -
+                              limits.outside_weight * static_cast<double>(axial.size() - inside);
+        for (std::size_t pad = 0; pad < odds.size(); ++pad)
+          found.push_back({static_cast<std::int32_t>(pad), motion, others + odds[pad], odds[pad]});
       }
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const ScoredMotion& a, const ScoredMotion& b) { return a.score > b.score; });
-  const Index count = std::min<Index>(static_cast<Index>(found.size()), limits.max_motions);
-  Array<std::int32_t, 2> motions({count, 3});
-  Array<double, 1> scores({count}), odds({count});
-  for (Index k = 0; k < count; ++k) {
-    motions(k, 0) = found[k].motion.turn, motions(k, 1) = found[k].motion.dq,
-               motions(k, 2) = found[k].motion.dr;
-    scores[k] = found[k].score, odds[k] = found[k].white;
-  }
-  return {std::move(motions), std::move(scores), std::move(odds)};
+  return best_motions(std::move(found), limits.max_motions);
 }
 
 Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,

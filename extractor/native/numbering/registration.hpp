@@ -22,21 +22,24 @@ struct WitnessLimits {
   }
 };
 
-// The layout as registration sees it.
+// The layouts of a family of pads as registration sees them: these differ in their white cells only.
 struct RegisteredLayout {
   View<const std::int32_t, 2> axial;        // (U, 2) of the colored cells
-  View<const std::int32_t, 2> white_axial;  // (W, 2) of the white down-cells
+  View<const std::int32_t, 2> white_axial;  // (W, 2) of the white down-cells of all pads
+  View<const std::int32_t, 1> white_pad;    // (W,) the pad of each, in ascending order
   View<const std::int32_t, 2> cell_lookup;  // (S, S), as Lattice.cell_lookup
 
   template <class F>
   static RegisteredLayout read(const F& f) {
-    return {f["axial"], f["white_axial"], f["cell_lookup"]};
+    return {f["axial"], f["white_axial"], f["white_pad"], f["cell_lookup"]};
   }
 };
 
-// The K best motions, the best first: (K, 3) turn, dq and dr; scores (K,), log odds; white (K,), the log
-// odds of the white places alone.
-using Motions = std::tuple<Array<std::int32_t, 2>, Array<double, 1>, Array<double, 1>>;
+// The K best motions, the best first: (K, 3) turn, dq and dr; (K,) the pad; scores (K,), log odds; white
+// (K,), the log odds of the white places alone; and the best score of all motions but the first without the
+// log odds of their white places.
+using Motions =
+    std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 1>, Array<double, 1>, Array<double, 1>, double>;
 
 // Motions of a part's N cells: `turn` rotations by 120 degrees about marker 0, then a shift.
 //

@@ -7,9 +7,7 @@ import pytest
 
 from benchmarks.pad_codes.parts import (
     NO_BRIGHT_PLACES,
-    STEPS_BESIDE,
     Pad,
-    down_cells_of,
     is_right,
     measured,
     pad_of,
@@ -33,9 +31,8 @@ def require_every_window_placed(pad: Pad, radius: int) -> None:
         inside = (np.abs(corners).max(axis=(1, 2)) <= radius) & (
             np.abs(corners.sum(axis=2)).max(axis=1) <= radius
         )
-        beside = (pad.down[inside][:, None] + STEPS_BESIDE).reshape(-1, 2)
-        places = axial[(axial[:, None] == beside).all(axis=2).any(axis=1)]
-        near = down_cells_of(pad, places) & inside
+        part = np.isin(np.arange(len(axial)), pad.beside[inside])
+        places, near = axial[part], pad.down_cells_of(part) & inside
         seen = seen_part(places, pad.down[near], pad.is_white[near].astype(float), random_motion(rng))
         placed = pad.registration.register(seen, NO_BRIGHT_PLACES)
         assert placed.is_certain and placed.is_proved_by_bits and is_right(placed, places), center
