@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from extractor.cells.cell_mesh import CellMesh, build_cell_mesh
 from extractor.cells.cells import EFFORTS, Cells, Effort, find_cells, has_color
 from extractor.cells.region_growing import grow
-from extractor.cells.triangle_fit import fit_edges, regions_as_cells, without_swelling
+from extractor.cells.triangle_fit import fit_edges, regions_as_cells
 from extractor.complete.image_quality import (
     SampledCells,
     measure_quality,
@@ -39,7 +39,7 @@ from extractor.layout.layout_file import LayoutLike, layouts_of
 from extractor.layout.reference import Reference
 from extractor.layout.topology import Topology, topology_of
 from extractor.numbering.ink_fields import Palette
-from extractor.numbering.lattice_walk import Walk, cell_light, count_holes, walk_cells
+from extractor.numbering.lattice_walk import Walk, cell_light, walk_cells
 from extractor.numbering.marker_places import InitialMarkers, merge_corners
 from extractor.numbering.missing_cells import with_missing_cells
 from extractor.numbering.registration import Numbering, Refusal, Registration
@@ -285,9 +285,9 @@ class Extractor:
             quality = measure_quality_without_numbers(pyramid.level(1), found.edge_px)
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
-        (cells, mesh, _, _), numbering = found
+        (_, mesh, _, _), numbering = found
         lattice = self._pads[numbering.pad].lattice
-        expected = with_missing_cells(without_swelling(cells, mesh), numbering, lattice)
+        expected = with_missing_cells(mesh.corner_px, numbering, lattice)
         triangles = stages.record(
             "triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px))
         )
@@ -393,7 +393,7 @@ class Extractor:
 
     def _is_whole(self, found: FoundCells) -> bool:
         """Whether the cells of an image are all found, as far as the cells themselves show it."""
-        return found.linked >= self._registration.min_cells and count_holes(found.walk) <= max(
+        return found.linked >= self._registration.min_cells and found.walk.holes <= max(
             MAX_HOLE_SHARE * found.linked, MIN_HOLES
         )
 

@@ -2,11 +2,12 @@
 
     python -m benchmarks.ablation [--rule NAME ...] [--together [--kind KIND]] [--preset NAME] [--pictures N] [--seed S]
 
-A rule for accuracy is tried on the suites plain, stress, damage, scatter and camera together; a rule whose purpose is
-that no wrong id is reported, on pictures made to provoke wrong ids. A rule stays if it saves a wrong id, or if without
-it wrong markers, lost markers or the RMS of measured markers rise by 2 % or more, with a paired 95 % interval above
-zero (bootstrap over pictures). A rule for true errors or for time stays, too, if z goes as far from 1, or if the share
-of markers beyond three deviations or the processor time rise so. Without a seed, that of the commit's hash is taken.
+A rule for accuracy is tried on the suites plain, stress, damage, scatter, camera, views and traced together; a rule
+whose purpose is that no wrong id is reported, on pictures made to provoke wrong ids. A rule stays if it saves a wrong
+id, or if without it wrong markers, lost markers or the RMS of measured markers rise by 2 % or more, with a paired 95 %
+interval above zero (bootstrap over pictures). A rule for true errors or for time stays, too, if z goes as far from 1,
+or if the share of markers beyond three deviations or the processor time rise so. Without a seed, that of the commit's
+hash is taken.
 
 Wrong ids are at another marker's place, or in a picture without the pattern; wrong positions are more than half of the
 shortest edge off. RMS is of all measured markers together, "typical" the geometric mean of the pictures' own RMS; both

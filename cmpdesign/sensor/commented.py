@@ -24,6 +24,22 @@ REMAINDER = """\
 # gel_index = 0.005            # of a data sheet
 # window_mm = 0.02             # calipers
 
+# The camera, and what its driver is asked for; `cmpdesign cameras` lists both. What is absent stays as it is.
+# [camera]
+# source = "0"
+# fps = 30.0
+# format = "MJPG"
+# exposure_ms = 8.0
+# gain = 0.0
+# white_balance_k = 4600.0
+# focus = 0.0
+
+# What is accepted of the running sensor.
+# [limits]
+# max_age_ms = 100.0           # of a result
+# max_rest_error_px = 0.1      # RMS of the markers at rest; without it by their deviations
+# min_share_read = 0.9         # of the markers in view
+
 # The elastic layer, for the touched surface (reconstruct --surface) and for forces (--contact).
 # [elastomer]
 # thickness_mm = 5.0

@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from cmpdesign.design.design import Design
-from cmpdesign.errors import CmpDesignError, DesignError
+from cmpdesign.errors import CmpDesignError, DesignError, SourceError
+from cmpdesign.inputs.cameras import CameraSettings
 from cmpdesign.inputs.names import Line, Name, nearest_name
 from extractor.image.response import light_of_values
 
@@ -150,6 +151,45 @@ class Calibrations(_StrictTable):
     rig: RigCalibration | None = None
 
 
+class CameraTable(_StrictTable):
+    """The camera, and what its driver is asked for; None: as the driver has it. Its size is the file's ``size_px``."""
+
+    source: Line = Field(
+        default="", description="As on the command line; of several cameras joined by commas."
+    )
+    fps: Positive | None = None
+    format: Line | None = Field(default=None, description="Four letters of the pixel format, as MJPG.")
+    exposure_ms: Positive | None = None
+    gain: float | None = Field(default=None, ge=0)
+    white_balance_k: Positive | None = None
+    focus: float | None = Field(default=None, ge=0)
+
+    @field_validator("format")
+    @classmethod
+    def _is_format(cls, value: str | None) -> str | None:
+        try:
+            CameraSettings(camera_format=value)
+        except SourceError:
+            raise ValueError(f"{value!r} is no pixel format; expected four letters, as in MJPG") from None
+        return value
+
+
+class LimitsTable(_StrictTable):
+    """What a user of the sensor accepts; ``calibrate check`` and the running sensor report what lies beyond.
+
+    Attributes:
+        max_age_ms: Chosen: 100, three frames of a camera of 30 frames a second.
+        max_rest_error_px: None: by the stated deviations of the markers.
+        min_share_read: Chosen: 0.9, since a rest frame shows nearly all markers.
+    """
+
+    max_age_ms: Positive = Field(default=100.0, description="Of a result, from the middle of its exposure.")
+    max_rest_error_px: Positive | None = Field(default=None, description="RMS at rest, per axis.")
+    min_share_read: float = Field(
+        default=0.9, ge=0, le=1, description="Markers measured, of those in view at rest."
+    )
+
+
 class SensorTable(_StrictTable):
     """The file without the tables of its rig, which the extractor's reader checks.
 
@@ -164,6 +204,8 @@ class SensorTable(_StrictTable):
     layout: Annotated[str, Field(min_length=1)] | None = None
     size_px: tuple[Pixels, Pixels] | None = None
     patterns: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    camera: CameraTable = CameraTable()
+    limits: LimitsTable = LimitsTable()
     elastomer: ElastomerTable | None = None
     contact: ContactTable | None = None
     calibration: Calibrations = Calibrations()
@@ -184,6 +226,20 @@ class SensorTable(_StrictTable):
             except DesignError as error:
                 raise ValueError(f"{name}: {error}") from None
         return value
+
+    @property
+    def camera_settings(self) -> CameraSettings:
+        """What the camera's driver is asked for."""
+        asked = self.camera
+        return CameraSettings(
+            self.size_px,
+            asked.fps,
+            asked.format,
+            asked.exposure_ms,
+            asked.gain,
+            asked.white_balance_k,
+            asked.focus,
+        )
 
     @field_validator("response")
     @classmethod

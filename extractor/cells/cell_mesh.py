@@ -59,10 +59,12 @@ class CellMesh:
         links: the links of the cells.
         swelling: sides of the cells' triangles over those at which neighbours just meet. Ink that bled and
             overexposure make cells larger.
+        corner_px: (N, 3, 2) float64, the corners of the cells whose sides are divided by the swelling.
     """
 
     links: CellLinks
     swelling: float
+    corner_px: NDArray[np.float64]
 
     @property
     def is_linked(self) -> NDArray[np.bool_]:
@@ -73,4 +75,5 @@ class CellMesh:
 def build_cell_mesh(cells: Cells) -> CellMesh:
     """Stage 6: the links of the cells."""
     *links, swelling = native.link_cells(cells.center_px, cells.corner_px, LIMITS)
-    return CellMesh(CellLinks(*links), float(swelling))
+    center = cells.center_px[:, None]
+    return CellMesh(CellLinks(*links), swelling, center + (cells.corner_px - center) / swelling)

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import cells as native
-from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import LIMITS, Cells
 from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_edges import update_triangle_corners
@@ -31,12 +30,6 @@ def regions_as_cells(cells: Cells, regions: Regions, view: PyramidLevel) -> Cell
         np.maximum(quality, cells.quality),
         cells.share,
     )
-
-
-def without_swelling(cells: Cells, mesh: CellMesh) -> NDArray[np.float64]:
-    """(N, 3, 2) the corners of the cells whose sides are divided by the swelling, around their centers."""
-    center = cells.center_px[:, None]
-    return center + (cells.corner_px - center) / mesh.swelling
 
 
 def fit_edges(view: PyramidLevel, corner_px: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 from extractor._native import numbering as native
 from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
-from extractor.cells.triangle_fit import without_swelling
 from extractor.image.pyramid import PyramidLevel
-
-MIN_HOLE_NEIGHBOURS = 3  # of a free place; beside a straight rim there are two. Derived
 
 
 class LinkInkLimits(NamedTuple):
@@ -39,10 +36,12 @@ class WalkLimits(NamedTuple):
 
     Attributes:
         max_rounds: walks, each without the cells contradicted before. Chosen.
+        min_hole_neighbours: cells around a place without one; beside a straight rim there are two. Derived.
         inks: of inks at links.
     """
 
     max_rounds: int = 6
+    min_hole_neighbours: int = 3
     inks: LinkInkLimits = LinkInkLimits()
 
 
@@ -58,12 +57,14 @@ class Walk:
         first: (N,) int8, the corner of the triangle that is the cell's corner 0.
         part: (N,) int32, the connected part, or -1 for a cell without one.
         contradictions: number of links that contradicted the walk.
+        holes: number of places without a cell among the cells of the parts.
     """
 
     axial: NDArray[np.int32]
     first: NDArray[np.int8]
     part: NDArray[np.int32]
     contradictions: int
+    holes: int
 
     @property
     def sizes(self) -> NDArray[np.int64]:
@@ -96,49 +97,18 @@ def cell_light(view: PyramidLevel, cells: Cells, mesh: CellMesh) -> NDArray[np.f
         view: the image at the scale of recognition.
         cells, mesh: the cells and their links.
     """
-    return np.asarray(native.cell_light(view, cells.center_px, without_swelling(cells, mesh)))
+    return np.asarray(native.cell_light(view, cells.center_px, mesh.corner_px))
 
 
 def walk_cells(mesh: CellMesh, light: NDArray[np.float64]) -> Walk:
     """Walk over all linked cells, along links that the cells' light (N, 3) does not contradict."""
-    bad = native.contradicted_links(mesh.links, light, LIMITS.inks)
-    links = mesh.links._replace(
-        neighbours=np.where(bad, -1, mesh.links.neighbours), back=np.where(bad, np.int8(-1), mesh.links.back)
-    )
-    axial, first, part, contradictions = native.walk_cells(links, LIMITS)
-    return Walk(axial, first, part, int(contradictions))
+    return Walk(*native.walk_cells(mesh.links, light, LIMITS))
 
 
 def seen_from(cells: Cells, mesh: CellMesh, walk: Walk, mirrored: bool) -> WalkedCells:
     """The walked cells of a pattern that is seen from its back (``mirrored``) or from its front."""
-    center, corner = cells.center_px, without_swelling(cells, mesh)
+    center, corner = cells.center_px, mesh.corner_px
     if mirrored:
         return WalkedCells(center, corner, walk.axial, walk.first, walk.part)
     axial, corner = np.ascontiguousarray(walk.axial[:, ::-1]), np.ascontiguousarray(corner[:, ::-1])
     return WalkedCells(center, corner, axial, (2 - walk.first).astype(np.int8), walk.part)
-
-
-def count_holes(walk: Walk) -> int:
-    """The number of places without a cell among the cells of the parts."""
-    known = walk.part >= 0
-    if not known.any():
-        return 0
-    axial, part = walk.axial[known], walk.part[known]
-    low = axial.min(axis=0) - 1
-    size = axial.max(axis=0) + 2 - low
-    holes = 0
-    for one in np.flatnonzero(walk.sizes > MIN_HOLE_NEIGHBOURS):
-        here = np.zeros(size, np.int8)
-        q, r = (axial[part == one] - low).T
-        here[q, r] = 1
-        inner = here[1:-1, 1:-1]
-        around = (
-            here[2:, 1:-1]
-            + here[:-2, 1:-1]
-            + here[1:-1, 2:]
-            + here[1:-1, :-2]
-            + here[2:, :-2]
-            + here[:-2, 2:]
-        )
-        holes += int(np.count_nonzero((inner == 0) & (around >= MIN_HOLE_NEIGHBOURS)))
-    return holes

@@ -9,9 +9,9 @@ WALK = (
         "inks at links",
         "neighbours of a cell have the other two inks",
         "no wrong id",
-        "extractor/numbering/lattice_walk.py",
-        "bad = native.contradicted_links(mesh.links, light, LIMITS.inks)",
-        "bad = np.zeros(mesh.links.neighbours.shape, np.bool_)",
+        "extractor/native/numbering/lattice_walk.cpp",
+        "contradicted = contradicted_links(all, light, limits.inks);",
+        "contradicted(all.neighbours.shape(), light.size() < 0);",
     ),
     Rule(
         "contradictions",

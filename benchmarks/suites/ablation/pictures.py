@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.suites.ablation.provoking import provoking_cases
+from benchmarks.suites.ablation.seen_views import traced_cases, view_cases
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.calibration.suites import suites_by_name
 from benchmarks.suites.stress.conditions import BY_NAME
@@ -20,8 +21,9 @@ from benchmarks.suites.stress.random_damage import RANDOM_KINDS
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 
-POOLED = ("plain", "stress", "damage", "scatter", "camera")
+POOLED = ("plain", "stress", "damage", "scatter", "camera", "views", "traced")
 PROVOKING = "provoking"
+GENERATED = {PROVOKING: provoking_cases, "views": view_cases, "traced": traced_cases}  # not drawn from all
 RANDOM_DRAWS = 16  # pictures of random damage per kind and pattern
 
 
@@ -58,8 +60,8 @@ def sampled_cases(suite: str, count: int, seed: int) -> list[CalibrationCase]:
     """``count`` pictures of a suite, drawn from all of its pictures by the seed; all pictures if the suite has
     fewer.
     """
-    if suite == PROVOKING:
-        return list(islice(provoking_cases(seed), count))
+    if suite in GENERATED:
+        return list(islice(GENERATED[suite](seed), count))
     cases = list(suites_by_name()[suite](False, seed))
     if suite == "damage":
         cases += random_damage_cases(seed, RANDOM_DRAWS)

@@ -29,6 +29,7 @@ SPOTS, SPOT_EDGES = (1, 8), (0.4, 2.5)  # number, radius
 SCRATCHES, SCRATCH_EDGES = (0, 3), (0.1, 0.5)  # number, width
 COVER_BGR = ((20, 20, 20), (128, 128, 128), (150, 180, 220), (45, 50, 200), (60, 150, 40), (190, 60, 45))
 COVER_NOISE = 2.0  # of 255
+LEAST_SHARE = 0.25  # of a cell that is partly seen
 CLEAR_PX = 2  # distance of a seen cell from every cover and from the picture's rim
 
 
@@ -47,8 +48,9 @@ class ViewResult:
 
     Attributes:
         view: the view.
-        cells: seen colored cells.
+        cells: wholly seen colored cells.
         motions: motions that put them into the pattern, the true one included.
+        motions_of_parts: motions that put partly seen cells into the pattern, too.
         reported: markers with a position.
         wrong_ids: markers reported at another marker's place.
         reason: the reader's reason; empty without one.
@@ -57,34 +59,73 @@ class ViewResult:
     view: View
     cells: int
     motions: int
+    motions_of_parts: int
     reported: int
     wrong_ids: int
     reason: str
 
 
-def read_view(view: View) -> ViewResult:
-    """Shoot, cover, and read a view; one thread."""
-    cv2.setNumThreads(1)
+@dataclass(frozen=True, eq=False)
+class ShotView:
+    """The picture of a view.
+
+    Attributes:
+        pose: of the pattern.
+        picture: with its covers; ``visible`` are the markers away from them.
+        cells: wholly seen colored cells.
+        motions: motions that put them into the pattern, the true one included; 0 without cells.
+        motions_of_parts: motions that put partly seen cells into the pattern, too.
+    """
+
+    pose: Pose
+    picture: CameraPicture
+    cells: int
+    motions: int
+    motions_of_parts: int
+
+
+def shoot_view(view: View) -> ShotView:
+    """Shoot and cover a view."""
     rng = np.random.default_rng([view.seed, view.number, KINDS.index(view.kind)])
     pose = _sample_pose(rng)
     lens = Lens(blur_px=float(rng.uniform(0.6, 1.1)))
     picture = shoot(Chain(pose=pose, lens=lens, sensor=Sensor(), seed=int(rng.integers(2**31))))
     covers = _covers(picture, pose, view.kind, rng)
-    picture = replace(picture, image=_covered(picture.image, covers, rng))
-    seen = seen_cells(picture, covers)
-    markers = cached_extractor(pose.pattern, pose.layers, "balanced").extract(picture.image)
+    picture = replace(
+        picture,
+        image=_covered(picture.image, covers, rng),
+        visible=picture.visible & ~_are_covered(picture.marker_xy_px, covers),
+    )
+    seen = up_cells(picture.layout, seen_cells(picture, covers))
+    pattern = up_cells(picture.layout, colored_cells(picture.layout))
+    parts = up_cells(picture.layout, partly_seen_cells(picture, covers))
+    motions, of_parts = (fitting_motions(pattern, some) if len(some) else 0 for some in (seen, parts))
+    return ShotView(pose, picture, len(seen), motions, of_parts)
+
+
+def read_view(view: View) -> ViewResult:
+    """Shoot, cover, and read a view; one thread."""
+    cv2.setNumThreads(1)
+    shot = shoot_view(view)
+    markers = cached_extractor(shot.pose.pattern, shot.pose.layers, "balanced").extract(shot.picture.image)
     return ViewResult(
         view=view,
-        cells=len(seen),
-        motions=fitting_motions(
-            up_cells(picture.layout, colored_cells(picture.layout)), up_cells(picture.layout, seen)
-        )
-        if len(seen)
-        else 0,
+        cells=shot.cells,
+        motions=shot.motions,
+        motions_of_parts=shot.motions_of_parts,
         reported=int(markers.status.astype(bool).sum()),
-        wrong_ids=int((marker_outcomes(picture, markers) == WRONG_ID).sum()),
+        wrong_ids=int((marker_outcomes(shot.picture, markers) == WRONG_ID).sum()),
         reason=str(markers.reason or ""),
     )
+
+
+def _are_covered(xy_px: NDArray[np.float64], covers: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """(M,) whether places lie on a cover; places outside the picture do not."""
+    place = np.rint(np.nan_to_num(xy_px, nan=-1.0)).astype(int)
+    inside = ((place >= 0) & (place < covers.shape[::-1])).all(axis=1)
+    covered = np.zeros(len(place), np.bool_)
+    covered[inside] = covers[place[inside, 1], place[inside, 0]] > 0
+    return covered
 
 
 def colored_cells(layout: Layout) -> NDArray[np.int64]:
@@ -107,6 +148,22 @@ def seen_cells(picture: CameraPicture, covers: NDArray[np.uint8]) -> NDArray[np.
     inside = ((corners >= CLEAR_PX) & (corners <= size - CLEAR_PX)).all(axis=(1, 2))
     clear = [not _touches(near, triangle) for triangle in corners[inside]]
     return np.asarray(cells[inside][np.array(clear, dtype=np.bool_)])
+
+
+def partly_seen_cells(picture: CameraPicture, covers: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """(K,) the red, green and blue cells of which at least ``LEAST_SHARE`` is in the picture and not covered."""
+    cells = colored_cells(picture.layout)
+    corners = np.rint(picture.marker_xy_px[picture.layout.cell_corners[cells]]).astype(int)
+    return np.asarray(cells[[_seen_share(covers, triangle) >= LEAST_SHARE for triangle in corners]])
+
+
+def _seen_share(covers: NDArray[np.uint8], triangle: NDArray[np.int64]) -> float:
+    low, size = triangle.min(axis=0), np.ptp(triangle, axis=0) + 1
+    inside = np.zeros(size[::-1], np.uint8)
+    cv2.fillConvexPoly(inside, (triangle - low).astype(np.int32), 1)
+    place = np.argwhere(inside)[:, ::-1] + low
+    place = place[((place >= 0) & (place < covers.shape[::-1])).all(axis=1)]
+    return float(np.count_nonzero(covers[place[:, 1], place[:, 0]] == 0) / np.count_nonzero(inside))
 
 
 def _touches(covers: NDArray[np.uint8], triangle: NDArray[np.float64]) -> bool:

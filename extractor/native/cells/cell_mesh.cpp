@@ -11,7 +11,6 @@ namespace cmp::cells {
 namespace {
 
 constexpr int CORNERS = 3;
-constexpr Index NEAREST = 5;  // corners that are looked at; three cells meet at a marker
 
 struct Vector {
   double x, y;
@@ -57,19 +56,17 @@ class Triangles {
   std::vector<Contact> contacts(double tolerance, double direction_tolerance) const {
     const auto grid = numeric::bucket_grid(points_);
     std::vector<Contact> out;
-    Array<std::int32_t, 1> index({NEAREST});
-    Array<double, 1> square({NEAREST});
     for (Index point = 0; point < points_.size(); ++point) {
       const Index i = point / CORNERS;
-      const Index found =
-          numeric::fill_nearest_points(grid, points_(point, 0), points_(point, 1), index, square);
-      for (Index n = 0; n < found; ++n) {
-        const Index other = index[n] / CORNERS;
-        const double reach = tolerance * std::min(edge_[i], edge_[other]);
-        if (other != i && square[n] < reach * reach)
-          add_contact(out, i, static_cast<int>(point % CORNERS), other, index[n] % CORNERS,
-                      direction_tolerance);
-      }
+      numeric::for_points_within(
+          grid, points_(point, 0), points_(point, 1), tolerance * edge_[i],
+          [&](std::int32_t near, double square) {
+            const Index other = near / CORNERS;
+            const double reach = tolerance * edge_[other];
+            if (other != i && square < reach * reach)
+              add_contact(out, i, static_cast<int>(point % CORNERS), other, near % CORNERS,
+                          direction_tolerance);
+          });
     }
     return out;
   }

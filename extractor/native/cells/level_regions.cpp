@@ -35,26 +35,31 @@ void add_run(MomentSums& sums, const Run& run) {
   m[6] += x3, m[7] += x2 * y, m[8] += x1 * y * y, m[9] += n * y * y * y;
 }
 
-// Writes the level of each pixel of a row, in 1 / FIXED_ONE, between the middles of tiles.
-void fill_row_levels(View<const float, 2> tiles, Index tile_px, Index y, View<std::int16_t, 1> out,
-                     View<float, 1> line) {
-  const Index rows = tiles.size(), columns = tiles.size(1);
-  const float place = (static_cast<float>(y) + 0.5F) / static_cast<float>(tile_px) - 0.5F;
-  const float inside = std::min(std::max(place, 0.0F), static_cast<float>(rows - 1));
-  const Index above = std::min<Index>(static_cast<Index>(inside), std::max<Index>(rows - 2, 0));
-  const Index below = std::min(above + 1, rows - 1);
-  const float share = inside - static_cast<float>(above);
-  for (Index x = 0; x < columns; ++x)
-    line[x] = FIXED_ONE * ((1.0F - share) * tiles(above, x) + share * tiles(below, x));
-  const Index half = tile_px / 2;
-  for (Index x = 0; x < std::min(half, out.size()); ++x) out[x] = static_cast<std::int16_t>(line[0]);
+// Writes the levels of a row of tiles at each pixel of a row, in 1 / FIXED_ONE, between the middles of tiles.
+void fill_wide(View<const float, 1> tiles, Index tile_px, View<float, 1> out) {
+  const Index half = tile_px / 2, columns = tiles.size();
+  out.slice(0, std::min(half, out.size())).fill(FIXED_ONE * tiles[0]);
   for (Index tile = 0; tile < columns; ++tile) {
-    const float from = line[tile], to = line[std::min(tile + 1, columns - 1)];
+    const float from = FIXED_ONE * tiles[tile], to = FIXED_ONE * tiles[std::min(tile + 1, columns - 1)];
     const float step = (to - from) / static_cast<float>(tile_px);
     const Index begin = half + tile * tile_px, end = std::min(begin + tile_px, out.size());
-    for (Index x = begin; x < end; ++x)
-      out[x] = static_cast<std::int16_t>(from + step * static_cast<float>(x - begin));
+    for (Index x = begin; x < end; ++x) out[x] = from + step * static_cast<float>(x - begin);
   }
+}
+
+CMP_PART_OF_LOOP void fill_between(View<const float, 1> above, View<const float, 1> below, float share,
+                                   View<std::int16_t, 1> out) {
+  for (Index x = 0; x < out.size(); ++x)
+    out[x] = static_cast<std::int16_t>(static_cast<std::int32_t>(above[x] + share * (below[x] - above[x])));
+}
+
+// Writes the level of each pixel of row y; wide (R, width), the levels of each row of tiles.
+void fill_row_levels(View<const float, 2> wide, Index tile_px, Index y, View<std::int16_t, 1> out) {
+  const Index last = wide.size() - 1;
+  const float place = (static_cast<float>(y) + 0.5F) / static_cast<float>(tile_px) - 0.5F;
+  const float inside = std::min(std::max(place, 0.0F), static_cast<float>(last));
+  const Index above = std::min<Index>(static_cast<Index>(inside), std::max<Index>(last - 1, 0));
+  fill_between(wide[above], wide[std::min(above + 1, last)], inside - static_cast<float>(above), out);
 }
 
 CMP_PART_OF_LOOP void fill_mask(View<const std::uint8_t, 1> values, View<const std::int16_t, 1> levels,
@@ -113,11 +118,12 @@ std::vector<Run> runs_above(const image::ContrastMap& map, double share, double 
   std::vector<Run> runs;
   runs.reserve(static_cast<std::size_t>(height) * 16);
   Array<std::int16_t, 1> levels({width});
-  Array<float, 1> line({tiles.size(1)});
+  Array<float, 2> wide({tiles.size(), width});
+  for (Index row = 0; row < tiles.size(); ++row) fill_wide(tiles[row], map.tile_px, wide[row]);
   Array<std::uint8_t, 1> mask({(width + 8) / 8 * 8}, std::uint8_t{0});  // ends outside a region
   const Index band = std::max<Index>(map.tile_px / BANDS, 1);           // rows with the same levels, for time
   for (Index y = 0; y < height; ++y) {
-    if (y % band == 0) fill_row_levels(tiles, map.tile_px, y + band / 2, levels, line);
+    if (y % band == 0) fill_row_levels(wide, map.tile_px, y + band / 2, levels);
     fill_mask(map.value[y], levels, mask.slice(0, width));
     add_runs(mask, static_cast<std::int32_t>(y), runs);
   }

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <span>
 #include <vector>
+
+#include "numeric/median.hpp"
 
 namespace cmp::complete {
 
@@ -19,11 +23,13 @@ struct Gridline {
   Vector middle, rise, jump;
 };
 
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return values.size() % 2 ? *middle : (*middle + *std::max_element(values.begin(), middle)) / 2;
+using Values = std::span<double>;
+
+double median(Values values) {
+  return numeric::median_of_many(View<double, 1>(values.data(), {static_cast<Index>(values.size())}));
 }
+
+double length(double x, double y) { return std::sqrt(x * x + y * y); }
 
 // The gridlines of four measured markers, and the lengths of all measured edges; a jump is a third of the
 // third difference.
@@ -38,9 +44,9 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
     if (!is_measured(a) || !is_measured(b)) continue;
     Gridline line{e, {}, {}, {}};
     for (int k = 0; k < 2; ++k) line.rise[k] = markers.xy_px(b, k) - markers.xy_px(a, k);
-    lengths.push_back(std::hypot(line.rise[0], line.rise[1]));
+    lengths.push_back(length(line.rise[0], line.rise[1]));
     const Index before = topology.next_markers(e, 0), after = topology.next_markers(e, 1);
-    const double own = std::hypot(topology.third_differences(e, 0), topology.third_differences(e, 1));
+    const double own = length(topology.third_differences(e, 0), topology.third_differences(e, 1));
     if (!is_measured(before) || !is_measured(after) || own >= 3 * most_of_layout) continue;
     const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
     uu += u * u, uv += u * v, vv += v * v;
@@ -67,19 +73,36 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
 // The length of the median jump of each strip along an axis, the later row or column less the earlier one.
 Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, double edge,
                              const JumpLimits& limits) {
-  std::vector<std::array<std::vector<double>, 2>> strips;
+  struct Crossing {
+    std::size_t strip;
+    Vector jump;
+  };
+  std::vector<Crossing> crossings;
+  std::vector<std::size_t> end;  // of each strip's crossings, sorted by strips
   for (const Gridline& line : lines) {
     const double rise = line.rise[axis];
     if (std::abs(rise) <= limits.min_rise * edge || line.middle[axis] < 0) continue;
     const auto strip = static_cast<std::size_t>(line.middle[axis] / (limits.bin * edge));
-    if (strip >= strips.size()) strips.resize(strip + 1);
-    for (int k = 0; k < 2; ++k)
-      strips[strip][k].push_back(std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge));
+    if (strip >= end.size()) end.resize(strip + 1);
+    ++end[strip];
+    const auto jump = [&](int k) {
+      return std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge);
+    };
+    crossings.push_back({strip, {jump(0), jump(1)}});
   }
-  Array<double, 1> jump({static_cast<Index>(strips.size())}, 0.0);
-  for (Index s = 0; s < jump.size(); ++s) {
-    auto& [x, y] = strips[s];
-    if (static_cast<Index>(x.size()) >= limits.min_gridlines) jump[s] = std::hypot(median(x), median(y));
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<std::size_t> next(end);
+  std::vector<double> x(crossings.size()), y(crossings.size());
+  for (const Crossing& one : crossings) {
+    const std::size_t at = --next[one.strip];
+    x[at] = one.jump[0], y[at] = one.jump[1];
+  }
+  Array<double, 1> jump({static_cast<Index>(end.size())}, 0.0);
+  for (std::size_t s = 0; s < end.size(); ++s) {
+    const std::size_t count = end[s] - next[s];
+    if (static_cast<Index>(count) >= limits.min_gridlines)
+      jump[static_cast<Index>(s)] =
+          length(median(Values(x).subspan(next[s], count)), median(Values(y).subspan(next[s], count)));
   }
   return jump;
 }

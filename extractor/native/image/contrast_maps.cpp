@@ -61,6 +61,18 @@ CMP_PART_OF_LOOP void fill_mixed(View<const std::uint8_t, 1> blue, View<const st
   }
 }
 
+CMP_PART_OF_LOOP std::uint8_t least_of(View<const std::uint8_t, 1> values) {
+  std::uint8_t least = 255;
+  for (Index i = 0; i < values.size(); ++i) least = std::min(least, values[i]);
+  return least;
+}
+
+CMP_PART_OF_LOOP std::uint8_t largest_of(View<const std::uint8_t, 1> values) {
+  std::uint8_t largest = 0;
+  for (Index i = 0; i < values.size(); ++i) largest = std::max(largest, values[i]);
+  return largest;
+}
+
 // The least and largest value of each tile.
 CMP_PART_OF_LOOP void fill_tile_levels(View<const std::uint8_t, 2> map, Index tile_px, View<float, 2> low,
                                        View<float, 2> high) {
@@ -79,26 +91,28 @@ CMP_PART_OF_LOOP void fill_tile_levels(View<const std::uint8_t, 2> map, Index ti
     }
     for (Index tx = 0; tx < low.size(1); ++tx) {
       const Index begin = tx * tile_px, end = std::min(begin + tile_px, width);
-      low(ty, tx) = *std::min_element(least_line.begin() + begin, least_line.begin() + end);
-      high(ty, tx) = *std::max_element(most_line.begin() + begin, most_line.begin() + end);
+      low(ty, tx) = least_of(least_line.slice(begin, end));
+      high(ty, tx) = largest_of(most_line.slice(begin, end));
     }
   }
 }
 
-// Replaces each tile by what `combine` makes of it and the tiles around it, one after the other.
+// Replaces each tile by what `combine` makes of it and the tiles around it; by its mean with them for a sum.
 template <class Combine>
-void update_by_neighbours(Array<float, 2>& tiles, Combine combine) {
+void update_by_neighbours(Array<float, 2>& tiles, Combine combine, bool is_sum) {
   const Array<float, 2> from(tiles.view());
   const Index rows = tiles.size(), columns = tiles.size(1);
-  for (Index y = 0; y < rows; ++y)
+  for (Index y = 0; y < rows; ++y) {
+    const Index top = std::max<Index>(y - 1, 0), bottom = std::min(y + 1, rows - 1);
     for (Index x = 0; x < columns; ++x) {
-      float value = from(y, x);
-      Index count = 1;
-      for (Index j = std::max<Index>(y - 1, 0); j <= std::min(y + 1, rows - 1); ++j)
-        for (Index i = std::max<Index>(x - 1, 0); i <= std::min(x + 1, columns - 1); ++i)
-          if (j != y || i != x) value = combine(value, from(j, i), ++count);
-      tiles(y, x) = value;
+      const Index left = std::max<Index>(x - 1, 0), right = std::min(x + 1, columns - 1);
+      float value = from(top, left);
+      for (Index i = left + 1; i <= right; ++i) value = combine(value, from(top, i));
+      for (Index j = top + 1; j <= bottom; ++j)
+        for (Index i = left; i <= right; ++i) value = combine(value, from(j, i));
+      tiles(y, x) = is_sum ? value / static_cast<float>((bottom - top + 1) * (right - left + 1)) : value;
     }
+  }
 }
 
 }  // namespace
@@ -129,13 +143,11 @@ ContrastMap contrast_map(View<const std::uint8_t, 3> channels, Index number, Ind
                   Array<float, 2>({rows, columns}), tile_px};
   fill_mixed(channels[0].flat(), channels[1].flat(), channels[2].flat(), MIXES[number], out.value.flat());
   fill_tile_levels(out.value, tile_px, out.low, out.high);
-  const auto mean = [](float value, float next, Index count) {
-    return value + (next - value) / static_cast<float>(count);
-  };
-  update_by_neighbours(out.low, [](float value, float next, Index) { return std::min(value, next); });
-  update_by_neighbours(out.high, [](float value, float next, Index) { return std::max(value, next); });
-  update_by_neighbours(out.low, mean);
-  update_by_neighbours(out.high, mean);
+  const auto sum = [](float a, float b) { return a + b; };
+  update_by_neighbours(out.low, [](float a, float b) { return std::min(a, b); }, false);
+  update_by_neighbours(out.high, [](float a, float b) { return std::max(a, b); }, false);
+  update_by_neighbours(out.low, sum, true);
+  update_by_neighbours(out.high, sum, true);
   return out;
 }
 

@@ -3,7 +3,6 @@
 
 #include "numbering/ink_fields.hpp"
 #include "numbering/lattice_walk.hpp"
-#include "numbering/link_inks.hpp"
 #include "numbering/marker_places.hpp"
 #include "numbering/missing_cells.hpp"
 #include "numbering/part_attachment.hpp"
@@ -12,9 +11,8 @@
 namespace cmp::numbering {
 
 void add_numbering(nb::module_ module) {
-  bind<&walk_cells>(module, "walk_cells", {"links", "limits"});
+  bind<&walk_cells>(module, "walk_cells", {"links", "light", "limits"});
   bind<&cell_light>(module, "cell_light", {"view", "center", "corner"});
-  bind<&contradicted_links>(module, "contradicted_links", {"links", "light", "limits"});
   bind<&ink_fields>(module, "ink_fields", {"view", "cells", "light", "part", "limits"});
   bind<&register_part>(module, "register_part",
                        {"axial", "naming", "white_axial", "white", "layout", "limits"});

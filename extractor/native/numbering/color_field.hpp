@@ -52,8 +52,8 @@ class ColorField {
   Color at(double x, double y) const {
     const Terms row = terms(x, y);
     Color out{};
-    for (Index c = 0; c < CHANNELS; ++c)
-      for (Index k = 0; k < terms_; ++k) out[c] += row[k] * solution_[c][k];
+    for (Index k = 0; k < TERMS; ++k)
+      for (Index c = 0; c < CHANNELS; ++c) out[c] += row[k] * solution_[k][c];
     return out;
   }
   double scatter() const { return scatter_; }  // the median residual, summed over the channels
@@ -67,7 +67,10 @@ class ColorField {
     const auto count = static_cast<double>(members.size());
     for (const Index i : members) middle_x_ += xy(i, 0) / count, middle_y_ += xy(i, 1) / count;
     double square = 0.0;
-    for (const Index i : members) square += std::hypot(xy(i, 0) - middle_x_, xy(i, 1) - middle_y_) / count;
+    for (const Index i : members) {
+      const double x = xy(i, 0) - middle_x_, y = xy(i, 1) - middle_y_;
+      square += std::sqrt(x * x + y * y) / count;
+    }
     size_ = std::max(square, 1.0);
   }
   Terms terms(double x, double y) const {
@@ -88,12 +91,12 @@ class ColorField {
     for (Index a = 0; a < terms_; ++a) normal(a, a) += RIDGE * normal(0, 0);
     if (!numeric::update_to_cholesky_solution(normal, right, terms_)) return;
     for (Index c = 0; c < CHANNELS; ++c)
-      for (Index k = 0; k < terms_; ++k) solution_[c][k] = right(c, k);
+      for (Index k = 0; k < terms_; ++k) solution_[k][c] = right(c, k);
   }
 
   Index terms_ = 1;
   double middle_x_ = 0.0, middle_y_ = 0.0, size_ = 1.0, scatter_ = 0.0;
-  std::array<Terms, CHANNELS> solution_{};
+  std::array<Color, TERMS> solution_{};  // zero beyond the terms of the degree
 };
 
 }  // namespace cmp::numbering

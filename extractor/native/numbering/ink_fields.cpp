@@ -46,17 +46,18 @@ std::vector<Color> light_at_points(const image::PyramidLevel& view, View<const d
 }
 
 // The median of each channel over the known colors; NaN without any.
-Color median_color(const std::vector<Color>& colors) {
+Color median_color(const Color* colors, Index count) {
+  constexpr Index FEW = 6;
   Color out{NOWHERE, NOWHERE, NOWHERE};
-  std::vector<double> values;
-  values.reserve(colors.size());
+  std::array<double, FEW> few;
+  std::vector<double> many(count > FEW ? static_cast<std::size_t>(count) : 0);
+  double* const values = count > FEW ? many.data() : few.data();
   for (Index c = 0; c < CHANNELS; ++c) {
-    values.clear();
-    for (const Color& color : colors)
-      if (std::isfinite(color[c])) values.push_back(color[c]);
-    const auto count = static_cast<Index>(values.size());
-    const View<double, 1> all(values.data(), {count});
-    if (count > 0) out[c] = count <= SIDES ? numeric::median_of(all, count) : numeric::median_of_many(all);
+    Index known = 0;
+    for (Index i = 0; i < count; ++i)
+      if (std::isfinite(colors[i][c])) values[known++] = colors[i][c];
+    const View<double, 1> all(values, {known});
+    if (known > 0) out[c] = count > FEW ? numeric::median_of_many(all) : numeric::median_of(all, known);
   }
   return out;
 }
@@ -92,7 +93,8 @@ class DownCells {
     }
     columns_ = high_r - low_r_ + 1;
     sums_ = Array<double, 2>({(high_q - low_q_ + 1) * columns_, TERMS}, 0.0);
-    for (const Index i : members) add_predictions(cells, i, limits);
+    const auto steps = steps_within(limits);
+    for (const Index i : members) add_predictions(cells, i, steps);
     number_ = Array<std::int32_t, 1>({sums_.size()}, -1);
     for (Index at = 0; at < sums_.size(); ++at)
       if (sums_(at, WEIGHT) > 0.0) {
@@ -120,20 +122,32 @@ class DownCells {
  private:
   static constexpr Index REACH = 3, X = 0, Y = 1, WEIGHT = 2, TERMS = 3;
 
-  // Adds the places of the down-cells up to two steps from a cell, as its triangle predicts them.
-  void add_predictions(const WalkedCells& cells, Index i, const InkFieldLimits& limits) {
-    const CellBasis basis(cells, i);
+  // A step from a cell to a down-cell, in axial places and in the cell's edges, and the weight of its place.
+  struct Step {
+    int dq, dr;
+    double q, r, weight;
+  };
+  static std::vector<Step> steps_within(const InkFieldLimits& limits) {
+    std::vector<Step> steps;
     for (int dq = -1; dq <= 2; ++dq)
       for (int dr = -2; dr <= 1; ++dr) {
         const double q = dq - 2.0 / 3.0, r = dr + 1.0 / 3.0, distance2 = q * q + q * r + r * r;
         if (distance2 > limits.place_reach2) continue;
-        const double root = limits.place_softening + distance2, weight = 1.0 / (root * root);
-        const auto sum =
-            sums_[(cells.axial(i, 0) + dq - low_q_) * columns_ + cells.axial(i, 1) + dr - low_r_];
-        sum[X] += weight * (cells.center_px(i, 0) + q * basis.ux + r * basis.vx);
-        sum[Y] += weight * (cells.center_px(i, 1) + q * basis.uy + r * basis.vy);
-        sum[WEIGHT] += weight;
+        const double root = limits.place_softening + distance2;
+        steps.push_back({dq, dr, q, r, 1.0 / (root * root)});
       }
+    return steps;
+  }
+  // Adds the places of the down-cells up to two steps from a cell, as its triangle predicts them.
+  void add_predictions(const WalkedCells& cells, Index i, const std::vector<Step>& steps) {
+    const CellBasis basis(cells, i);
+    for (const Step& step : steps) {
+      const auto sum =
+          sums_[(cells.axial(i, 0) + step.dq - low_q_) * columns_ + cells.axial(i, 1) + step.dr - low_r_];
+      sum[X] += step.weight * (cells.center_px(i, 0) + step.q * basis.ux + step.r * basis.vx);
+      sum[Y] += step.weight * (cells.center_px(i, 1) + step.q * basis.uy + step.r * basis.vy);
+      sum[WEIGHT] += step.weight;
+    }
   }
 
   Index low_q_ = INT32_MAX, low_r_ = INT32_MAX, columns_ = 0;
@@ -212,27 +226,26 @@ class DownLight {
   // (D,) light over that of the down-cells around, relative to the strongest inks there; NaN outside the
   // image. (D,) whether the light fills the triangle of a bright down-cell, and no cell beside it.
   std::pair<Array<double, 1>, Array<bool, 1>> whiteness() const {
-    const Color usual = median_color(light_);
+    const Color usual = median_color(light_.data(), static_cast<Index>(light_.size()));
     Array<double, 1> whiteness({down_.size()}, NOWHERE);
     Array<bool, 1> is_triangle({down_.size()}, false);
-    std::vector<Color> around;
+    std::array<Color, std::size(NEIGHBOURS)> around;
     for (Index n = 0; n < down_.size(); ++n) {
       if (!std::isfinite(light_[n][0])) continue;
-      around.clear();
+      Index known = 0;
       for (const auto& step : NEIGHBOURS) {
         const std::int32_t other = down_.number(down_.q(n) + step[0], down_.r(n) + step[1]);
-        if (other >= 0 && std::isfinite(light_[other][0])) around.push_back(light_[other]);
+        if (other >= 0 && std::isfinite(light_[other][0])) around[known++] = light_[other];
       }
-      const Color black = around.size() < 2 ? usual : median_color(around),
+      const Color black = known < 2 ? usual : median_color(around.data(), known),
                   over = difference(light_[n], black);
       double own = 0.0, most = 0.0;
-      for (Index c = 0; c < CHANNELS; ++c) {
-        double strongest = 0.0;
-        for (const ColorField& field : fields_)
-          strongest = std::max(strongest, field.at(down_.xy()(n, 0), down_.xy()(n, 1))[c]);
-        own += over[c];
-        most += strongest;
+      Color strongest{};
+      for (const ColorField& field : fields_) {
+        const Color ink = field.at(down_.xy()(n, 0), down_.xy()(n, 1));
+        for (Index c = 0; c < CHANNELS; ++c) strongest[c] = std::max(strongest[c], ink[c]);
       }
+      for (Index c = 0; c < CHANNELS; ++c) own += over[c], most += strongest[c];
       whiteness[n] = own / std::max(most, 1e-6);
       is_triangle[n] = whiteness[n] > limits_.bright && fills_triangle(n, black, over);
     }
@@ -320,7 +333,7 @@ Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 
   for (Index i = 0; i < count; ++i) {
     const auto own = shown.begin() + (1 + SIDES) * i;
     if (!std::isfinite((*own)[0])) continue;
-    const Color black = median_color({own + 1, own + 1 + SIDES});
+    const Color black = median_color(&*own + 1, SIDES);
     if (!std::isfinite(black[0])) continue;
     const Color light = difference(*own, black);
     std::copy(light.begin(), light.end(), out[i].begin());

@@ -6,16 +6,6 @@
 
 namespace cmp::numbering {
 
-// The limits of inks at links; the Python module explains them.
-struct LinkInkLimits {
-  double likeness, least_difference;
-
-  template <class F>
-  static LinkInkLimits read(const F& f) {
-    return {f["likeness"], f["least_difference"]};
-  }
-};
-
 // (N, 6) whether the colors contradict a link.
 //
 // Of a cell's six neighbours three are of the next class, (q - r) mod 3, and three of the class before. A

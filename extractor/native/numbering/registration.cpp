@@ -22,9 +22,12 @@ Extent trimmed_extent(const std::vector<AxialStep>& places, int axis, double sha
   std::vector<std::int32_t> values;
   values.reserve(places.size());
   for (const AxialStep& a : places) values.push_back(axis == 0 ? a.q : axis == 1 ? a.r : a.q + a.r);
-  std::sort(values.begin(), values.end());
-  const auto cut = static_cast<std::size_t>(share * static_cast<double>(values.size()));
-  return {values[cut], values[values.size() - 1 - cut]};
+  const auto cut = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
+  const auto low = values.begin() + cut, high = values.end() - 1 - cut;
+  std::nth_element(values.begin(), low, values.end());
+  const std::int32_t lowest = *low;
+  std::nth_element(low, high, values.end());
+  return {lowest, *high};
 }
 
 struct ScoredMotion {

@@ -42,6 +42,9 @@ BROKEN = {
     "size_px = [300, 360]\n": "view 'left': area_px [0, 0, 320, 480] reaches beyond size_px [300, 360]",
     "calibration.camera.parameters = ['a']\ncalibration.camera.covariance = [[-1.0]]\n": "covariance is not symmetric",
     "calibration.camera.parameters = ['a']\ncalibration.camera.covariance = [[1.0, 2.0]]\n": "expected 1 rows of 1",
+    "camera.format = 'JPG'\n": "'JPG' is no pixel format",
+    "camera.size_px = [1, 2]\n": "camera.size_px is unknown",
+    "limits.min_share_read = 90\n": "limits.min_share_read = 90 must be less than or equal to 1",
     "elastomer.thickness_mm = 2.0\nelastomer.marker_depth_mm = 3.0\n": "must be below thickness_mm",
 }
 
@@ -68,7 +71,7 @@ def test_a_new_sensor_file_holds_the_camera_twice_behind_mirrors(folder: Path) -
     assert str(sensor.table.calibration.camera.date) == "2026-03-01"
     # what the comments propose is right when it is uncommented
     proposed = sensor.text.replace("# [medium]\n", "[medium]\n").replace("# gel_mm = 4.0\n", "gel_mm = 4.0\n")
-    tables = ("# [medium_deviation]", "# [elastomer]")
+    tables = ("# [medium_deviation]", "# [camera]", "# [limits]", "# [elastomer]")
     lines = [
         line[2:] if line in tables or (line.startswith("# ") and " = " in line) else line
         for line in proposed.splitlines()
@@ -76,6 +79,9 @@ def test_a_new_sensor_file_holds_the_camera_twice_behind_mirrors(folder: Path) -
     uncommented = "\n".join(lines)
     whole = parse_sensor_file(uncommented)
     assert whole.rig.medium_deviation and whole.table.elastomer is not None
+    assert whole.table.limits.max_rest_error_px == 0.1 and whole.table.camera.source == "0"
+    asked = {"camera_size": (640, 360), "camera_fps": 30, "camera_format": "MJPG", "exposure_ms": 8}
+    assert asked.items() <= whole.table.camera_settings.asked.items()
     assert "exists already" in refused("init", path, "--sensor", folder / "layout.json", *camera)
     assert "needs --sensor LAYOUT and --camera FILE" in refused("init", folder / "new", *camera)
 
