@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor.cells.cell_mesh import CellMesh, build_cell_mesh
-from extractor.cells.cells import EFFORTS, Cells, Effort, find_cells, has_color
+from extractor.cells.cells import CODED_EFFORTS, EFFORTS, Cells, Effort, find_cells, has_color
 from extractor.cells.region_growing import grow
 from extractor.cells.triangle_fit import fit_edges, regions_as_cells
 from extractor.complete.image_quality import (
@@ -250,6 +250,7 @@ class Extractor:
         lattices = [pad.lattice for pad in self._pads]
         self._registration = Registration(lattices, Palette(dict(layout.palette)), self._mirrored)
         self._cells = len(lattices[0].ink)
+        self._efforts = EFFORTS if layout.code is None else CODED_EFFORTS
         self._pads[0].prepare()
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -363,7 +364,7 @@ class Extractor:
         little, then the others, the last one first. Looks with too small cells are left out."""
         skipped: list[FoundCells] = []
         before: FoundCells | None = None
-        for effort in EFFORTS:
+        for effort in self._efforts:
             found = self._find_cells(view, before.cells if before else None, effort, stages)
             gains = before is None or found.linked >= MIN_GAIN * before.linked
             before = found
@@ -379,7 +380,7 @@ class Extractor:
         self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages
     ) -> FoundCells:
         cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort, before))
-        if effort is not EFFORTS[0]:
+        if before is not None:
             cells = stages.record("grow", regions_as_cells(cells, grow(view, cells), view))
         mesh = stages.record("mesh", build_cell_mesh(cells))
         light = stages.record("light", cell_light(view, cells, mesh))

@@ -24,20 +24,18 @@ def coded_layout(layers: int, code: int) -> Layout:
 
 
 def partial_view(layout: Layout, share: float, rng: np.random.Generator) -> Rendered:
-    """A picture of which one side cuts off all of the pad but a share of its markers; the whole pad for a share of 1."""
+    """A picture of whose pad one side shows only a share of the markers; of the whole pad for a share of 1."""
     turn_deg, tilt_deg, axis_deg = rng.uniform(0, 360), rng.uniform(0, 10), rng.uniform(0, 360)
     along = layout.marker_xy_mm @ [np.cos(np.radians(turn_deg)), -np.sin(np.radians(turn_deg))]
     cut_px = PITCH_PX / 1.5 * float(np.quantile(along, 1 - share))
     centre = (230.0, 230.0) if share == 1 else (-cut_px, 230.0)
     camera = Camera(PITCH_PX, turn_deg, tilt_deg, axis_deg, centre_px=centre)
-    scene = Scene(
-        layout, camera, optics=Optics(1.0), sensor=Sensor(noise=2.0), seed=int(rng.integers(2**31))
-    )
+    scene = Scene(layout, camera, optics=Optics(1.0), sensor=Sensor(noise=2.0), seed=int(rng.integers(2**31)))
     return render(scene, size=SIZE)
 
 
 def verdict_of(markers: Markers, shot: Rendered, code: int) -> str:
-    """"right", "refused", or "wrong": another pad, or a marker that is not at its place."""
+    """ "right", "refused", or "wrong": another pad, or a marker that is not at its place."""
     if not markers.found:
         return "refused"
     off_px = np.linalg.norm(markers.xy_px - shot.truth.marker_xy_px, axis=1)

@@ -92,9 +92,10 @@ def layouts_of(given: LayoutLike | Sequence[LayoutLike]) -> tuple[Reference, ...
     codes = [one.code and one.code.id for one in layouts]
     doubtful = next((code for code in codes if len(layouts) > 1 and (not code or codes.count(code) > 1)), 0)
     if doubtful != 0:
+        same = f"the code {doubtful}" if doubtful else "no code"
         raise LayoutError(
-            f"{codes.count(doubtful)} of {len(layouts)} layouts have {f'the code {doubtful}' if doubtful else 'no code'}; "
-            "pads are told apart by their codes: give each its own"
+            f"{codes.count(doubtful)} of {len(layouts)} layouts have {same}; pads are told apart by their codes: give "
+            "each its own"
         )
     return layouts
 

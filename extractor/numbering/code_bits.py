@@ -1,12 +1,13 @@
 """Stage 7: the bits of a coded pad, one witness of a part's motion.
 
 A black place of the pattern is a bit: white or black. Each bit that differs from the layout's has the same log odds
-against a motion. By bits alone a motion is accepted if few are wrong, and if the second best motion has so many
-more that misread bits would not explain its defeat.
+against a motion. By bits alone a motion is accepted if few are wrong, and if chance would hardly make as many white
+places agree, or the second best motion has so many more wrong bits that misread bits would not explain its defeat.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +27,11 @@ class CodeLimits(NamedTuple):
         cells_beside: of the part, at the sides of a place, with fewer of which the place may be hidden. Chosen.
         min_bits: known bits, with fewer of which a code is not known. Derived: three quarters of the smallest window.
         max_misfit: share of the known bits that are wrong. Measured: ``python -m benchmarks.pad_codes``.
+        max_log_chance: natural logarithm of the expected number of motions of another pad that agree as well.
+            Measured: the same command.
         lead_bits, lead_share: the least number of bits, and the share of the known bits, that the second best motion
-            has wrong in addition. Measured: the same command.
+            has wrong in addition; then chance is not asked, as the windows of a code differ in so many bits. Measured:
+            the same command.
     """
 
     wrong_bit: float = 3.0
@@ -35,6 +39,7 @@ class CodeLimits(NamedTuple):
     cells_beside: int = 2
     min_bits: int = 36
     max_misfit: float = 0.1
+    max_log_chance: float = -12.0
     lead_bits: float = 3.0
     lead_share: float = 0.1
 
@@ -78,9 +83,24 @@ class CodeBits(NamedTuple):
         """Whether the bits are enough to tell codes apart."""
         return self.known >= LIMITS.min_bits
 
+    def log_chance(self, odds: float, known_white: int, motions: int) -> float:
+        """The logarithm of the expected number of motions by which chance makes as many white places agree.
+
+        Args:
+            odds: log odds of the motion.
+            known_white: number of the known places that the motion makes white.
+            motions: number of the motions that were compared.
+        """
+        agreed, black = round((odds / LIMITS.wrong_bit + known_white) / 2), self.known - known_white
+        ways = sum(
+            math.comb(known_white, n) * math.comb(black, self.white - n)
+            for n in range(agreed, min(known_white, self.white) + 1)
+        )
+        return math.log(max(motions, 1)) + math.log(ways) - math.log(math.comb(self.known, self.white))
+
     @property
     def min_lead(self) -> float:
-        """Log odds over the second best motion, from which on bits alone prove a motion."""
+        """Log odds over the second best motion, from which on these alone prove a motion."""
         return LIMITS.wrong_bit * (LIMITS.lead_bits + LIMITS.lead_share * self.known)
 
 

@@ -21,7 +21,7 @@ from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
-from extractor.numbering.code_bits import CodeBits
+from extractor.numbering.code_bits import LIMITS, CodeBits
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
@@ -71,14 +71,28 @@ class Motions(NamedTuple):
         pad: (K,) int32, the pad of a family.
         score: (K,) float64, log odds.
         white: (K,) float64, the log odds of the white places alone.
+        known_white: (K,) int32, the number of the known ones of these.
         rival_without_white: the best score of all motions of the part but the first, without their white places.
+        count: number of all motions of the part.
     """
 
     motion: NDArray[np.int32]
     pad: NDArray[np.int32]
     score: NDArray[np.float64]
     white: NDArray[np.float64]
+    known_white: NDArray[np.int32]
     rival_without_white: float
+    count: int
+
+    def chosen(self, order: NDArray[np.intp], score: NDArray[np.float64]) -> Motions:
+        """Some of the motions, with other scores."""
+        return self._replace(
+            motion=self.motion[order],
+            pad=self.pad[order],
+            score=score,
+            white=self.white[order],
+            known_white=self.known_white[order],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +213,11 @@ class PlacedPart(NamedTuple):
 
     @property
     def is_proved_by_bits(self) -> bool:
-        return self.bits is not None and self.lead >= self.bits.min_lead
+        if self.bits is None or not self.is_code:
+            return False
+        motions = self.motions
+        chance = self.bits.log_chance(float(motions.white[0]), int(motions.known_white[0]), motions.count)
+        return self.lead >= self.bits.min_lead or chance <= LIMITS.max_log_chance
 
     @property
     def lead_without_bits(self) -> float:
@@ -332,12 +350,7 @@ class Registration:
         counts = [np.count_nonzero(self._placed_cells(placed, int(k), parts) >= 0) for k in first]
         score = motions.score[:count] + WITNESSES.outside_weight * np.array(counts)[same.reshape(-1)]
         order = np.argsort(-score, kind="stable")
-        chosen = motions._replace(
-            motion=motions.motion[order],
-            pad=motions.pad[order],
-            score=score[order],
-            white=motions.white[order],
-        )
+        chosen = motions.chosen(order, score[order])
         decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
         is_certain = decided.lead >= JOINT_LEAD and (not self._is_family or decided.is_proved_by_bits)
         return [decided] if is_certain and decided.is_code else []

@@ -58,7 +58,8 @@ def verify(
         Path,
         typer.Argument(
             metavar="LAYOUT...",
-            help="The pattern's layout.json; or those of several pads with different codes, of which a picture shows one.",
+            help="The pattern's layout.json; or those of several pads with different codes: pictures show any "
+            "one of them.",
         ),
     ],
     images: SourcesArgument,

@@ -12,7 +12,7 @@ namespace cmp::cells {
 void add_cells(nb::module_ module) {
   bind<&find_candidates>(
       module, "find_candidates",
-      {"image", "count", "shares", "center", "area", "corner", "quality", "share", "limits"});
+      {"image", "maps", "shares", "center", "area", "corner", "quality", "share", "limits"});
   bind<&grow>(module, "grow", {"hsv", "seed_xy", "limit_px", "limits"});
   bind<&fit_to_moments>(module, "fit_to_moments", {"moments", "seed", "limits"});
   bind<&update_triangle_corners>(module, "update_triangle_corners", {"view", "corners", "good", "limits"});

@@ -66,14 +66,14 @@ double own_share(const image::ContrastMap& map, const MomentShape& shape, double
 }
 
 // The triangles of some maps at some levels.
-std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index count,
+std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
                                      View<const double, 1> shares, const CandidateLimits& limits) {
   std::vector<Candidate> all;
   const auto channels = image::smoothed_channels(image);
   const double least = limits.min_contrast_deviations * std::max(image::smoothed_noise(channels), 0.3);
   const double most = limits.max_area_share * static_cast<double>(image.size(0) * image.size(1));
-  for (Index k = 0; k < count; ++k) {
-    const auto map = image::contrast_map(channels, k, limits.tile_px);
+  for (const std::int64_t number : maps) {
+    const auto map = image::contrast_map(channels, number, limits.tile_px);
     for (const double share : shares)
       for (const MomentSums& sums : level_regions(map, share, least, limits.min_area_px, most)) {
         const MomentShape shape = shape_of(sums);
@@ -91,11 +91,12 @@ std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index co
 
 }  // namespace
 
-FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index count, View<const double, 1> shares,
-                                View<const double, 2> center, View<const double, 1> area,
-                                View<const double, 3> corner, View<const double, 1> quality,
-                                View<const double, 1> share, const CandidateLimits& limits) {
-  std::vector<Candidate> all = candidates_of(image, count, shares, limits);
+FoundCandidates find_candidates(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
+                                View<const double, 1> shares, View<const double, 2> center,
+                                View<const double, 1> area, View<const double, 3> corner,
+                                View<const double, 1> quality, View<const double, 1> share,
+                                const CandidateLimits& limits) {
+  std::vector<Candidate> all = candidates_of(image, maps, shares, limits);
   for (Index i = 0; i < center.size(); ++i) {
     Candidate one{center(i, 0), center(i, 1), area[i], quality[i], share[i], {}};
     for (Index k = 0; k < 6; ++k) one.corner[k] = corner(i, k / 2, k % 2);

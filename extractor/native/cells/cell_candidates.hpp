@@ -31,11 +31,12 @@ struct CandidateLimits {
 using FoundCandidates =
     std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 3>, Array<double, 1>, Array<double, 1>>;
 
-// Cells of the image (H, W, 3), by the first `count` contrast maps, and by those that
+// Cells of the image (H, W, 3), by some of the contrast maps, and by those that
 // were found before; of several at one place the one with the best shape.
-FoundCandidates find_candidates(View<const std::uint8_t, 3> image, Index count, View<const double, 1> shares,
-                                View<const double, 2> center, View<const double, 1> area,
-                                View<const double, 3> corner, View<const double, 1> quality,
-                                View<const double, 1> share, const CandidateLimits& limits);
+FoundCandidates find_candidates(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
+                                View<const double, 1> shares, View<const double, 2> center,
+                                View<const double, 1> area, View<const double, 3> corner,
+                                View<const double, 1> quality, View<const double, 1> share,
+                                const CandidateLimits& limits);
 
 }  // namespace cmp::cells

@@ -35,6 +35,7 @@ struct ScoredMotion {
   Motion motion;
   double score;
   double white;
+  std::int32_t known;  // of its white places
 };
 
 // The log odds of white over black by axial place.
@@ -49,10 +50,11 @@ class WhitePlaces {
     for (Index n = 0; n < axial.size(); ++n)
       lookup_(axial(n, 0) + reach_, axial(n, 1) + reach_) = static_cast<std::int32_t>(n);
   }
+  // NaN for an unknown place
   double at(AxialStep a) const {
-    if (std::abs(a.q) > reach_ || std::abs(a.r) > reach_) return 0.0;
+    if (std::abs(a.q) > reach_ || std::abs(a.r) > reach_) return std::numeric_limits<double>::quiet_NaN();
     const std::int32_t n = lookup_(a.q + reach_, a.r + reach_);
-    return n < 0 || std::isnan(odds_[n]) ? 0.0 : odds_[n];
+    return n < 0 ? std::numeric_limits<double>::quiet_NaN() : odds_[n];
   }
 
  private:
@@ -79,17 +81,23 @@ Motions best_motions(std::vector<ScoredMotion> found, Index most) {
     return found[a].score > found[b].score || (found[a].score == found[b].score && a < b);
   });
   Array<std::int32_t, 2> motions({count, 3});
-  Array<std::int32_t, 1> pads({count});
+  Array<std::int32_t, 1> pads({count}), known({count});
   Array<double, 1> scores({count}), odds({count});
   for (Index k = 0; k < count; ++k) {
     const ScoredMotion& one = found[order[k]];
     motions(k, 0) = one.motion.turn, motions(k, 1) = one.motion.dq, motions(k, 2) = one.motion.dr;
-    pads[k] = one.pad, scores[k] = one.score, odds[k] = one.white;
+    pads[k] = one.pad, scores[k] = one.score, odds[k] = one.white, known[k] = one.known;
   }
   double without_white = -std::numeric_limits<double>::infinity();
   for (std::size_t n = 1; n < order.size(); ++n)
     without_white = std::max(without_white, found[order[n]].score - found[order[n]].white);
-  return {std::move(motions), std::move(pads), std::move(scores), std::move(odds), without_white};
+  return {std::move(motions),
+          std::move(pads),
+          std::move(scores),
+          std::move(odds),
+          std::move(known),
+          without_white,
+          static_cast<Index>(found.size())};
 }
 
 }  // namespace
@@ -108,7 +116,9 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
   std::array<Extent, 3> allowed;
   for (int axis = 0; axis < 3; ++axis) allowed[axis] = trimmed_extent(of_layout, axis, 0.0);
   std::vector<ScoredMotion> found;
-  std::vector<double> odds(static_cast<std::size_t>(layout.white_pad[layout.white_pad.size() - 1]) + 1);
+  const std::int32_t pads = layout.white_pad[layout.white_pad.size() - 1] + 1;
+  std::vector<double> odds(pads);
+  std::vector<std::int32_t> known(pads);
   for (std::int32_t turn = 0; turn < TURNS; ++turn) {
     std::vector<AxialStep> turned;
     for (const AxialStep& a : cells) turned.push_back(turned_up(a, turn));
@@ -121,14 +131,18 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
         if (inside < 0) continue;
         const Motion motion{turn, dq, dr};
         std::fill(odds.begin(), odds.end(), 0.0);
-        for (Index w = 0; w < layout.white_axial.size(); ++w)
-          odds[layout.white_pad[w]] +=
+        std::fill(known.begin(), known.end(), 0);
+        for (Index w = 0; w < layout.white_axial.size(); ++w) {
+          const double one =
               whites.at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
+          if (std::isnan(one)) continue;
+          odds[layout.white_pad[w]] += one, ++known[layout.white_pad[w]];
+        }
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
         const double others = naming[((shift % 3) + 3) % 3] -
                               limits.outside_weight * static_cast<double>(axial.size() - inside);
-        for (std::size_t pad = 0; pad < odds.size(); ++pad)
-          found.push_back({static_cast<std::int32_t>(pad), motion, others + odds[pad], odds[pad]});
+        for (std::int32_t pad = 0; pad < pads; ++pad)
+          found.push_back({pad, motion, others + odds[pad], odds[pad], known[pad]});
       }
   }
   return best_motions(std::move(found), limits.max_motions);

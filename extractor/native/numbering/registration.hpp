@@ -36,10 +36,10 @@ struct RegisteredLayout {
 };
 
 // The K best motions, the best first: (K, 3) turn, dq and dr; (K,) the pad; scores (K,), log odds; white
-// (K,), the log odds of the white places alone; and the best score of all motions but the first without the
-// log odds of their white places.
-using Motions =
-    std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 1>, Array<double, 1>, Array<double, 1>, double>;
+// (K,), the log odds of the white places alone; (K,) the number of the known ones of these; the best score of
+// all motions but the first without the log odds of their white places; and the number of all motions.
+using Motions = std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 1>, Array<double, 1>, Array<double, 1>,
+                           Array<std::int32_t, 1>, double, Index>;
 
 // Motions of a part's N cells: `turn` rotations by 120 degrees about marker 0, then a shift.
 //

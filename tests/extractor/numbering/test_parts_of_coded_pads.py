@@ -10,6 +10,7 @@ from benchmarks.pad_codes.parts import (
     Pad,
     is_right,
     measured,
+    moved,
     pad_of,
     random_motion,
     seen_part,
@@ -33,7 +34,9 @@ def require_every_window_placed(pad: Pad, radius: int) -> None:
         )
         part = np.isin(np.arange(len(axial)), pad.beside[inside])
         places, near = axial[part], pad.down_cells_of(part) & inside
-        seen = seen_part(places, pad.down[near], pad.is_white[near].astype(float), random_motion(rng))
+        motion = random_motion(rng)
+        frame = moved(places, motion, up=True), moved(pad.down[near], motion, up=False)
+        seen = seen_part(places, *frame, pad.is_white[near].astype(float))
         placed = pad.registration.register(seen, NO_BRIGHT_PLACES)
         assert placed.is_certain and placed.is_proved_by_bits and is_right(placed, places), center
 
@@ -49,7 +52,7 @@ def test_every_window_of_every_code_has_its_place(code: int) -> None:
 
 
 def require_none_wrong(layers: int, parts: int, seed: int) -> None:
-    counts, _ = measured(layers, parts, seed)
+    counts = measured(layers, parts, seed)
     assert sum(one["wrong"] for one in counts.values()) == 0
     assert counts["120 and more"]["right"] > 0.3 * counts["120 and more"].total()
 
