@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from cmpdesign import Design, build_layout
 from extractor import Reference
 from extractor.layout.lattice_tables import Lattice, cells_at, lattice_of
-from extractor.numbering.code_bits import STEPS_BESIDE
 from extractor.numbering.ink_fields import LIMITS, InkFields, Palette
 from extractor.numbering.lattice_walk import WalkedCells
 from extractor.numbering.registration import PlacedPart, Registration, SeenPart
@@ -30,6 +29,7 @@ PARTS_AT_ONCE = 200  # of one pad
 NO_COLORS = np.zeros((0, 3))
 GROUPS = {"30 to 59 known bits": (LEAST_BITS, 60), "60 to 119": (60, 120), "120 and more": (120, 10**6)}
 NO_BRIGHT_PLACES = BrightPlaces(0, 0)
+STEPS_BESIDE = np.array([[0, 0], [-1, 0], [-1, 1]])  # from a down-cell to the up-cells that share its sides
 LATTICE_STEPS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
 
 

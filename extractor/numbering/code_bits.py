@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import numbering as native
 from extractor.numbering.ink_fields import InkFields
-
-STEPS_BESIDE = np.array([[0, 0], [-1, 0], [-1, 1]])  # from a down-cell to the up-cells that share its sides
 
 
 class CodeLimits(NamedTuple):
@@ -26,22 +25,23 @@ class CodeLimits(NamedTuple):
         dark: whiteness up to which a place is black; blurred and milky black stays below. Chosen.
         cells_beside: of the part, at the sides of a place, with fewer of which the place may be hidden. Chosen.
         min_bits: known bits, with fewer of which a code is not known. Derived: three quarters of the smallest window.
-        max_misfit: share of the known bits that are wrong. Measured: ``python -m benchmarks.pad_codes``.
+        max_misfit: share of the known bits that are wrong. Derived: less than the eighth in which whole pads differ.
         max_log_chance: natural logarithm of the expected number of motions of another pad that agree as well.
             Measured: the same command.
         lead_bits, lead_share: the least number of bits, and the share of the known bits, that the second best motion
-            has wrong in addition; then chance is not asked, as the windows of a code differ in so many bits. Measured:
-            the same command.
+            has wrong in addition. Derived: the windows of a code differ in so many bits.
+        max_log_chance_with_lead: as ``max_log_chance``, with this lead. Measured: the same command.
     """
 
     wrong_bit: float = 3.0
     dark: float = 0.3
     cells_beside: int = 2
     min_bits: int = 36
-    max_misfit: float = 0.1
+    max_misfit: float = 0.12
     max_log_chance: float = -12.0
     lead_bits: float = 3.0
     lead_share: float = 0.1
+    max_log_chance_with_lead: float = -8.0
 
 
 LIMITS = CodeLimits()
@@ -64,7 +64,7 @@ class CodeBits(NamedTuple):
     @staticmethod
     def of(fields: InkFields, axial: NDArray[np.int32]) -> CodeBits:
         """The bits of a part with the cells (P, 2). A bright place that is no triangle is unknown: glare or dirt."""
-        beside = _cells_beside(fields.down_axial, axial)
+        beside = native.cells_beside(axial, fields.down_axial)
         white = fields.is_triangle
         black = (fields.whiteness < LIMITS.dark) & (beside >= LIMITS.cells_beside)
         odds = np.where(white, LIMITS.wrong_bit, np.where(black, -LIMITS.wrong_bit, np.nan))
@@ -83,32 +83,24 @@ class CodeBits(NamedTuple):
         """Whether the bits are enough to tell codes apart."""
         return self.known >= LIMITS.min_bits
 
-    def log_chance(self, odds: float, known_white: int, motions: int) -> float:
-        """The logarithm of the expected number of motions by which chance makes as many white places agree.
+    def proves(self, odds: float, known_white: int, motions: int, lead: float) -> bool:
+        """Whether bits alone prove a motion.
 
         Args:
             odds: log odds of the motion.
             known_white: number of the known places that the motion makes white.
             motions: number of the motions that were compared.
+            lead: log odds over the second best motion.
         """
+        leads = lead >= LIMITS.wrong_bit * (LIMITS.lead_bits + LIMITS.lead_share * self.known)
+        most = LIMITS.max_log_chance_with_lead if leads else LIMITS.max_log_chance
+        return self.is_code(odds) and self._log_chance(odds, known_white, motions) <= most
+
+    def _log_chance(self, odds: float, known_white: int, motions: int) -> float:
+        """The logarithm of the expected number of motions by which chance makes as many white places agree."""
         agreed, black = round((odds / LIMITS.wrong_bit + known_white) / 2), self.known - known_white
         ways = sum(
             math.comb(known_white, n) * math.comb(black, self.white - n)
             for n in range(agreed, min(known_white, self.white) + 1)
         )
         return math.log(max(motions, 1)) + math.log(ways) - math.log(math.comb(self.known, self.white))
-
-    @property
-    def min_lead(self) -> float:
-        """Log odds over the second best motion, from which on these alone prove a motion."""
-        return LIMITS.wrong_bit * (LIMITS.lead_bits + LIMITS.lead_share * self.known)
-
-
-def _cells_beside(down_axial: NDArray[np.int32], axial: NDArray[np.int32]) -> NDArray[np.int64]:
-    """(D,) number of the cells (P, 2) that share a side with each down-cell (D, 2)."""
-    low = np.minimum(axial.min(axis=0), down_axial.min(axis=0, initial=0)) - 1
-    shape = np.maximum(axial.max(axis=0), down_axial.max(axis=0, initial=0)) - low + 2
-    is_cell = np.zeros(shape, np.bool_)
-    is_cell[tuple((axial - low).T)] = True
-    beside = down_axial[:, None] + STEPS_BESIDE - low
-    return np.asarray(is_cell[beside[..., 0], beside[..., 1]].sum(axis=1))

@@ -21,7 +21,7 @@ from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
-from extractor.numbering.code_bits import LIMITS, CodeBits
+from extractor.numbering.code_bits import CodeBits
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
@@ -213,11 +213,10 @@ class PlacedPart(NamedTuple):
 
     @property
     def is_proved_by_bits(self) -> bool:
-        if self.bits is None or not self.is_code:
-            return False
         motions = self.motions
-        chance = self.bits.log_chance(float(motions.white[0]), int(motions.known_white[0]), motions.count)
-        return self.lead >= self.bits.min_lead or chance <= LIMITS.max_log_chance
+        return self.bits is not None and self.bits.proves(
+            float(motions.white[0]), int(motions.known_white[0]), motions.count, self.lead
+        )
 
     @property
     def lead_without_bits(self) -> float:

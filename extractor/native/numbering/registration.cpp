@@ -38,10 +38,10 @@ struct ScoredMotion {
   std::int32_t known;  // of its white places
 };
 
-// The log odds of white over black by axial place.
-class WhitePlaces {
+// The numbers of axial places.
+class AxialPlaces {
  public:
-  WhitePlaces(View<const std::int32_t, 2> axial, View<const double, 1> odds) : odds_(odds) {
+  explicit AxialPlaces(View<const std::int32_t, 2> axial) {
     for (Index n = 0; n < axial.size(); ++n) {
       const std::int32_t reach = std::max(std::abs(axial(n, 0)), std::abs(axial(n, 1)));
       reach_ = std::max(reach_, reach);
@@ -50,15 +50,12 @@ class WhitePlaces {
     for (Index n = 0; n < axial.size(); ++n)
       lookup_(axial(n, 0) + reach_, axial(n, 1) + reach_) = static_cast<std::int32_t>(n);
   }
-  // NaN for an unknown place
-  double at(AxialStep a) const {
-    if (std::abs(a.q) > reach_ || std::abs(a.r) > reach_) return std::numeric_limits<double>::quiet_NaN();
-    const std::int32_t n = lookup_(a.q + reach_, a.r + reach_);
-    return n < 0 ? std::numeric_limits<double>::quiet_NaN() : odds_[n];
+  std::int32_t number_at(AxialStep a) const {
+    if (std::abs(a.q) > reach_ || std::abs(a.r) > reach_) return -1;
+    return lookup_(a.q + reach_, a.r + reach_);
   }
 
  private:
-  View<const double, 1> odds_;
   std::int32_t reach_ = 0;
   Array<std::int32_t, 2> lookup_;
 };
@@ -105,7 +102,7 @@ Motions best_motions(std::vector<ScoredMotion> found, Index most) {
 Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> naming,
                       View<const std::int32_t, 2> white_axial, View<const double, 1> white,
                       const RegisteredLayout& layout, const WitnessLimits& limits) {
-  const WhitePlaces whites(white_axial, white);
+  const AxialPlaces places(white_axial);
   const auto most =
       std::max(limits.min_outside,
                static_cast<std::int64_t>(limits.max_outside_share * static_cast<double>(axial.size())));
@@ -133,10 +130,10 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
         std::fill(odds.begin(), odds.end(), 0.0);
         std::fill(known.begin(), known.end(), 0);
         for (Index w = 0; w < layout.white_axial.size(); ++w) {
-          const double one =
-              whites.at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
-          if (std::isnan(one)) continue;
-          odds[layout.white_pad[w]] += one, ++known[layout.white_pad[w]];
+          const std::int32_t place =
+              places.number_at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
+          if (place < 0 || std::isnan(white[place])) continue;
+          odds[layout.white_pad[w]] += white[place], ++known[layout.white_pad[w]];
         }
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
         const double others = naming[((shift % 3) + 3) % 3] -
@@ -146,6 +143,18 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
       }
   }
   return best_motions(std::move(found), limits.max_motions);
+}
+
+Array<std::int32_t, 1> cells_beside(View<const std::int32_t, 2> axial,
+                                    View<const std::int32_t, 2> down_axial) {
+  const AxialPlaces cells(axial);
+  Array<std::int32_t, 1> out({down_axial.size()});
+  for (Index n = 0; n < down_axial.size(); ++n) {
+    const std::int32_t q = down_axial(n, 0), r = down_axial(n, 1);
+    for (const AxialStep beside : {AxialStep{q, r}, {q - 1, r}, {q - 1, r + 1}})
+      if (cells.number_at(beside) >= 0) ++out[n];
+  }
+  return out;
 }
 
 Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,

@@ -50,6 +50,10 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
                       View<const std::int32_t, 2> white_axial, View<const double, 1> white,
                       const RegisteredLayout& layout, const WitnessLimits& limits);
 
+// (D,) the number of cells (N, 2) that share a side with each down-cell (D, 2).
+Array<std::int32_t, 1> cells_beside(View<const std::int32_t, 2> axial,
+                                    View<const std::int32_t, 2> down_axial);
+
 // (N,) the layout's cell of each cell (N, 2) after a motion, or -1.
 Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,
                                    std::int32_t dr, View<const std::int32_t, 2> cell_lookup);
