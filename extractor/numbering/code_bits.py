@@ -24,7 +24,6 @@ class CodeLimits(NamedTuple):
         wrong_bit: log odds against a motion for each wrong bit. Chosen.
         dark: whiteness up to which a place is black; blurred and milky black stays below. Chosen.
         cells_beside: of the part, at the sides of a place, with fewer of which the place may be hidden. Chosen.
-        min_bits: known bits, with fewer of which a code is not known. Derived: three quarters of the smallest window.
         max_misfit: share of the known bits that are wrong. Derived: less than the eighth in which whole pads differ.
         max_log_chance: natural logarithm of the expected number of motions of another pad that agree as well.
             Measured: the same command.
@@ -36,7 +35,6 @@ class CodeLimits(NamedTuple):
     wrong_bit: float = 3.0
     dark: float = 0.3
     cells_beside: int = 2
-    min_bits: int = 36
     max_misfit: float = 0.12
     max_log_chance: float = -12.0
     lead_bits: float = 3.0
@@ -74,27 +72,22 @@ class CodeBits(NamedTuple):
         """The share of the known bits that are wrong by a motion with these log odds; outside the layout is black."""
         return (self.white - odds / LIMITS.wrong_bit) / max(self.known, 1)
 
-    def is_code(self, odds: float) -> bool:
-        """Whether a motion with these log odds shows the layout's code, and no other one."""
-        return self.is_known and self.misfit(odds) <= LIMITS.max_misfit
-
-    @property
-    def is_known(self) -> bool:
-        """Whether the bits are enough to tell codes apart."""
-        return self.known >= LIMITS.min_bits
+    def is_other(self, odds: float) -> bool:
+        """Whether the bits contradict the layout's code, by the best motion, which has these log odds."""
+        return self.misfit(odds) * self.known > LIMITS.max_misfit * self.known + LIMITS.lead_bits
 
     def proves(self, odds: float, known_white: int, motions: int, lead: float) -> bool:
-        """Whether bits alone prove a motion.
+        """Whether the bits show the layout's code, and no other one, and where by a motion.
 
         Args:
             odds: log odds of the motion.
             known_white: number of the known places that the motion makes white.
-            motions: number of the motions that were compared.
+            motions: number of the motions that were compared; 1 if the outline decided.
             lead: log odds over the second best motion.
         """
         leads = lead >= LIMITS.wrong_bit * (LIMITS.lead_bits + LIMITS.lead_share * self.known)
         most = LIMITS.max_log_chance_with_lead if leads else LIMITS.max_log_chance
-        return self.is_code(odds) and self._log_chance(odds, known_white, motions) <= most
+        return self.misfit(odds) <= LIMITS.max_misfit and self._log_chance(odds, known_white, motions) <= most
 
     def _log_chance(self, odds: float, known_white: int, motions: int) -> float:
         """The logarithm of the expected number of motions by which chance makes as many white places agree."""

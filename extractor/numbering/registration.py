@@ -197,14 +197,16 @@ class PlacedPart(NamedTuple):
 
     @property
     def is_certain(self) -> bool:
-        if len(self.motions.score) == 0 or self.lead < LEAD or not self.is_code:
+        if len(self.motions.score) == 0 or self.lead < LEAD:
             return False
-        return self.bits is None or self.is_proved_by_bits or self.lead_without_bits >= LEAD
+        return (
+            self.bits is None or self.is_proved_by_bits or (self.lead_without_bits >= LEAD and self.is_code)
+        )
 
     @property
     def is_code(self) -> bool:
-        """Whether the best motion shows the code of the layout, if it has one."""
-        return self.bits is None or self.bits.is_code(float(self.motions.white[0]))
+        """Whether the best motion, if it is right, shows the code of the layout, if the layout has one."""
+        return self._shows_code(motions=1, lead=0.0)
 
     def has_motion_of(self, other: PlacedPart) -> bool:
         """Whether the best motions of both agree."""
@@ -213,10 +215,11 @@ class PlacedPart(NamedTuple):
 
     @property
     def is_proved_by_bits(self) -> bool:
-        motions = self.motions
-        return self.bits is not None and self.bits.proves(
-            float(motions.white[0]), int(motions.known_white[0]), motions.count, self.lead
-        )
+        return self.bits is not None and self._shows_code(self.motions.count, self.lead)
+
+    def _shows_code(self, motions: int, lead: float) -> bool:
+        white, known = float(self.motions.white[0]), int(self.motions.known_white[0])
+        return self.bits is None or self.bits.proves(white, known, motions, lead)
 
     @property
     def lead_without_bits(self) -> float:
@@ -423,8 +426,8 @@ def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bo
 def _uncertain_reason(placed: PlacedPart) -> Reason:
     """Why a part has no certain motion."""
     if placed.bits is not None:
-        known = len(placed.motions.score) > 0 and placed.bits.is_known
-        return Reason.OTHER_CODE if known and not placed.is_code else Reason.AMBIGUOUS
+        is_other = len(placed.motions.score) > 0 and placed.bits.is_other(float(placed.motions.white[0]))
+        return Reason.OTHER_CODE if is_other else Reason.AMBIGUOUS
     white = placed.motions.white
     close = placed.tied
     whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites

@@ -148,7 +148,7 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
 Array<std::int32_t, 1> cells_beside(View<const std::int32_t, 2> axial,
                                     View<const std::int32_t, 2> down_axial) {
   const AxialPlaces cells(axial);
-  Array<std::int32_t, 1> out({down_axial.size()});
+  Array<std::int32_t, 1> out({down_axial.size()}, 0);
   for (Index n = 0; n < down_axial.size(); ++n) {
     const std::int32_t q = down_axial(n, 0), r = down_axial(n, 1);
     for (const AxialStep beside : {AxialStep{q, r}, {q - 1, r}, {q - 1, r + 1}})
