@@ -26,10 +26,12 @@ class CodeLimits(NamedTuple):
         cells_beside: of the part, at the sides of a place, with fewer of which the place may be hidden. Chosen.
         max_misfit: share of the known bits that are wrong. Derived: less than the eighth in which whole pads differ.
         max_log_chance: natural logarithm of the expected number of motions of another pad that agree as well.
-            Measured: the same command.
+            Measured: ``python -m benchmarks.pad_codes``.
         lead_bits, lead_share: the least number of bits, and the share of the known bits, that the second best motion
             has wrong in addition. Derived: the windows of a code differ in so many bits.
         max_log_chance_with_lead: as ``max_log_chance``, with this lead. Measured: the same command.
+        other_bits, other_log_chance: known bits, from which on another code is named as the reason where the best
+            motion agrees no better. Chosen.
     """
 
     wrong_bit: float = 3.0
@@ -40,6 +42,8 @@ class CodeLimits(NamedTuple):
     lead_bits: float = 3.0
     lead_share: float = 0.1
     max_log_chance_with_lead: float = -8.0
+    other_bits: int = 75
+    other_log_chance: float = -4.0
 
 
 LIMITS = CodeLimits()
@@ -72,9 +76,12 @@ class CodeBits(NamedTuple):
         """The share of the known bits that are wrong by a motion with these log odds; outside the layout is black."""
         return (self.white - odds / LIMITS.wrong_bit) / max(self.known, 1)
 
-    def is_other(self, odds: float) -> bool:
-        """Whether the bits contradict the layout's code, by the best motion, which has these log odds."""
-        return self.misfit(odds) * self.known > LIMITS.max_misfit * self.known + LIMITS.lead_bits
+    def is_other(self, odds: float, known_white: int, motions: int) -> bool:
+        """Whether the bits contradict the layout's code by the best motion; arguments as in ``proves``."""
+        wrong = self.misfit(odds) * self.known
+        agrees = self._log_chance(odds, known_white, motions) <= LIMITS.other_log_chance
+        is_chance = self.known >= LIMITS.other_bits and not agrees
+        return is_chance or wrong > LIMITS.max_misfit * self.known + LIMITS.lead_bits
 
     def proves(self, odds: float, known_white: int, motions: int, lead: float) -> bool:
         """Whether the bits show the layout's code, and no other one, and where by a motion.

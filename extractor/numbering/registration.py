@@ -206,7 +206,8 @@ class PlacedPart(NamedTuple):
     @property
     def is_code(self) -> bool:
         """Whether the best motion, if it is right, shows the code of the layout, if the layout has one."""
-        return self._shows_code(motions=1, lead=0.0)
+        white, known, _ = self.evidence
+        return self.bits is None or self.bits.proves(white, known, 1, lead=0.0)
 
     def has_motion_of(self, other: PlacedPart) -> bool:
         """Whether the best motions of both agree."""
@@ -215,11 +216,13 @@ class PlacedPart(NamedTuple):
 
     @property
     def is_proved_by_bits(self) -> bool:
-        return self.bits is not None and self._shows_code(self.motions.count, self.lead)
+        return self.bits is not None and self.bits.proves(*self.evidence, self.lead)
 
-    def _shows_code(self, motions: int, lead: float) -> bool:
-        white, known = float(self.motions.white[0]), int(self.motions.known_white[0])
-        return self.bits is None or self.bits.proves(white, known, motions, lead)
+    @property
+    def evidence(self) -> tuple[float, int, int]:
+        """Log odds and number of the known white places by the best motion, and the number of motions."""
+        motions = self.motions
+        return float(motions.white[0]), int(motions.known_white[0]), motions.count
 
     @property
     def lead_without_bits(self) -> float:
@@ -426,7 +429,7 @@ def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bo
 def _uncertain_reason(placed: PlacedPart) -> Reason:
     """Why a part has no certain motion."""
     if placed.bits is not None:
-        is_other = len(placed.motions.score) > 0 and placed.bits.is_other(float(placed.motions.white[0]))
+        is_other = len(placed.motions.score) > 0 and placed.bits.is_other(*placed.evidence)
         return Reason.OTHER_CODE if is_other else Reason.AMBIGUOUS
     white = placed.motions.white
     close = placed.tied
