@@ -27,17 +27,8 @@ from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from benchmarks.suites.scoring.calibration import calibration_head, squared_distances, summarise
-from benchmarks.suites.scoring.squares import (
-    PictureSquares,
-    calibration_lines,
-    calibrations_by_position,
-    picture_squares,
-)
-from benchmarks.support.command import publishing_parser, wide_console
-from benchmarks.support.machine import conditions_text, write_json
-from benchmarks.support.published import write_published
-from benchmarks.support.scenes import (
+from benchmarks.frame.conditions import conditions_text
+from benchmarks.suites.scenes import (
     SCENE_KINDS,
     WRONG_SHARE,
     SceneCase,
@@ -46,6 +37,13 @@ from benchmarks.support.scenes import (
     inner_markers,
     shortest_edges,
 )
+from benchmarks.suites.scoring.calibration import calibration_table, squared_distances, summarise
+from benchmarks.suites.scoring.squares import (
+    PictureSquares,
+    calibrations_by_position,
+    picture_squares,
+)
+from benchmarks.support.command import publishing_parser, wide_console, write_json, write_published
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
 from extractor.presets import PRESETS, Preset
@@ -161,8 +159,12 @@ def squares_by_preset(measured: Sequence[MeasuredCase]) -> dict[str, list[Pictur
 
 def calibration_text(squares: Mapping[str, Sequence[PictureSquares]]) -> str:
     """The calibration of all markers and virtual markers, one line per preset and status."""
-    lines = [line for preset, pictures in squares.items() for line in calibration_lines(preset, pictures)]
-    return "\n".join([calibration_head("errors over covariances"), *lines, ""])
+    found = {
+        f"{preset}: {position}": stated
+        for preset, pictures in squares.items()
+        for position, stated in calibrations_by_position(pictures).items()
+    }
+    return f"{calibration_table('', found)}\n"
 
 
 def markdown(results: Sequence[AccuracyResult]) -> str:

@@ -1,47 +1,44 @@
 """Random damage: the number of wrong markers and their images, over any number of seeds.
 
-    python -m benchmarks.damage [--images N] [--seed S] [--json FILE]
-    python -m benchmarks.damage --only "random blobs/round/5017" --save DIR     one image, read alone, and its overlay
-
 Scratches, drops, reflections and missing cells of any color, size and number, on surfaces pressed, twisted, sheared and
-tilted, under light of any color. Fresh seeds are images that no rule of the extractor has been tuned on.
+tilted, under light of any color. Fresh seeds are images that no rule of the extractor has been tuned on. "ids" are the
+wrong markers at another marker's position; "kept" is the share of the sure markers, those off the image's rim with a
+visible cell, that is measured or repaired.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import multiprocessing
-import os
-import sys
-import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.scoring.calibration import Calibration, calibration_head, calibration_line
+from benchmarks.frame.experiment import Experiment, Found, OptionError, Shown
+from benchmarks.frame.parallel import PROCESSES, results_of
+from benchmarks.frame.table import TEXT, Table
+from benchmarks.suites.scoring.calibration import Calibration, calibration_table
 from benchmarks.suites.scoring.reading import (
+    CaseReading,
     CaseResult,
     draw_overlay,
     find_wrong_markers,
     notable_lines,
     read_case,
-    warm_up,
 )
 from benchmarks.suites.scoring.report import result_line
 from benchmarks.suites.scoring.squares import calibrations_by_position
 from benchmarks.suites.stress.frames import PATTERNS, CaseImage
 from benchmarks.suites.stress.kinds import StressCase
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
-from benchmarks.support.machine import null_for_nan
-from cmpdesign.files.atomic import write_file
 from extractor import Markers
 
-IMAGES, SEED = 2100, 5000
-NAME_WIDTH = 48  # of a kind and a status
+SEED = 5000
+COLUMNS = {
+    "kind": TEXT, "images": "d", "unread": "d", "visible": "d", "reported": "d", "wrong": "d", "ids": "d", "lost": "d",
+    "sure": "d", "kept": ".2%",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -119,32 +116,11 @@ def count_swapped_markers(shot: CaseImage, markers: Markers) -> int:
     return int((distance_px.argmin(axis=1) != np.flatnonzero(wrong)).sum()) if wrong.any() else 0
 
 
-def _read_case(case: StressCase) -> DamageResult:
+def read_damaged(case: StressCase) -> DamageResult:
     result, shot, markers = read_case(case, 1, timing=False)
     return DamageResult(
         result, count_swapped_markers(shot, markers) if markers is not None and result.score.wrong else 0
     )
-
-
-def read_cases(chosen: list[StressCase], processes: int) -> Iterator[DamageResult]:
-    """Results in the order of completion."""
-    if processes == 1:
-        warm_up()
-        yield from map(_read_case, chosen)
-        return
-    with multiprocessing.get_context("spawn").Pool(processes, warm_up) as pool:
-        yield from pool.imap_unordered(_read_case, chosen, chunksize=4)
-
-
-def with_progress(chosen: list[StressCase], processes: int) -> list[DamageResult]:
-    """All results in the order of seeds, with the progress on stderr."""
-    results, started = [], time.perf_counter()
-    for entry in read_cases(chosen, processes):
-        results.append(entry)
-        if sys.stderr.isatty() or len(results) % 200 == 0:
-            text = f"{len(results)}/{len(chosen)} images, {time.perf_counter() - started:.0f} s"
-            print(text, end="\r" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
-    return sorted(results, key=lambda entry: entry.result.case.seed)
 
 
 def total_of_kind(kind: str, entries: Sequence[DamageResult]) -> DamageTotal:
@@ -178,86 +154,72 @@ def totals_by_kind(results: Sequence[DamageResult]) -> list[DamageTotal]:
     return [*(row for row in rows if row.images), total_of_kind("together", results)]
 
 
-HEAD = (
-    f"{'kind':<24}{'images':>8}{'unread':>8}{'visible':>10}{'reported':>10}{'wrong':>7}{'ids':>6}{'lost':>9}"
-    f"{'sure':>10}{'kept %':>9}"
-)
+def totals_table(rows: Sequence[DamageTotal]) -> Table:
+    """One row per kind, and one of all images."""
+    return Table(
+        "random damage",
+        COLUMNS,
+        [
+            (r.kind, r.images, r.unread, r.visible, r.reported, r.wrong, r.others, r.lost, r.sure,
+             r.kept / r.sure if r.sure else None)
+            for r in rows
+        ],
+    )  # fmt: skip
 
 
-def totals_table(rows: Sequence[DamageTotal]) -> str:
-    """The printed table; ``ids`` are the wrong markers at another marker's position."""
-    lines = [HEAD]
-    for row in rows:
-        share = f"{100 * row.kept / row.sure:.2f}" if row.sure else "-"
-        lines.append(
-            f"{row.kind:<24}{row.images:>8}{row.unread:>8}{row.visible:>10}{row.reported:>10}{row.wrong:>7}"
-            f"{row.others:>6}{row.lost:>9}{row.sure:>10}{share:>9}"
-        )
-    together = rows[-1]
-    lines += [f"WRONG {count:>4}  {name}" for name, count in together.seeds]
-    lines += [f"RAISED {together.raised} images"] * bool(together.raised)
-    return "\n".join(lines)
+def wrong_lines(together: DamageTotal) -> list[str]:
+    """The images with wrong markers."""
+    lines = [f"WRONG {count:>4}  {name}" for name, count in together.seeds]
+    return [*lines, *[f"RAISED {together.raised} images"] * bool(together.raised)]
 
 
-def calibration_table(rows: Sequence[DamageTotal]) -> str:
-    """Errors over stated covariances, by kind and by how positions were found."""
-    lines = [
-        calibration_line(f"{row.kind}: {position}", calibration, NAME_WIDTH)
-        for row in rows
-        for position, calibration in row.calibrations.items()
-    ]
-    return "\n".join([calibration_head("errors over covariances", NAME_WIDTH), *lines])
-
-
-def read_one_image(case: StressCase, save: Path | None) -> CaseResult:
-    """Read one image in this process, print its wrong markers, and write the image with its overlay."""
+def save_image(read: CaseReading, folder: Path) -> None:
+    """Write an image and its overlay."""
     import cv2
 
-    warm_up()
-    result, shot, markers = read_case(case, 1, timing=False)
-    print(result_line(result))
-    for line in notable_lines(shot, markers):
-        print(f"    {line}")
-    if save is not None:
-        save.mkdir(parents=True, exist_ok=True)
-        stem = case_name(case).replace("/", "-").replace(" ", "_")
-        cv2.imwrite(str(save / f"{stem}.png"), shot.image)
-        if markers is not None:
-            cv2.imwrite(str(save / f"{stem}.overlay.png"), draw_overlay(shot, case, markers))
-    return result
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = case_name(read.result.case).replace("/", "-").replace(" ", "_")
+    cv2.imwrite(str(folder / f"{stem}.png"), read.shot.image)
+    if read.markers is not None:
+        overlay = draw_overlay(read.shot, read.result.case, read.markers)
+        cv2.imwrite(str(folder / f"{stem}.overlay.png"), overlay)
 
 
-def write_json(rows: Sequence[DamageTotal], path: Path) -> None:
-    """Write every row as an object."""
-    write_file(path, json.dumps([null_for_nan(asdict(row)) for row in rows], indent=1) + "\n")
+def measure(
+    images: int = 2100,
+    seed: int = SEED,
+    only: str = "",
+    save: Path | None = None,
+    processes: int = PROCESSES,
+) -> Shown:
+    """One row per kind and the images with wrong markers; fails if there is one, or an image raised.
 
-
-def main(arguments: list[str] | None = None) -> int:
-    """Print one row per kind and the images with wrong markers. Returns 1 if there is one, or an image raised."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.damage", description=__doc__.split("\n")[0])
-    parser.add_argument("--images", type=int, default=IMAGES, metavar="N")
-    parser.add_argument("--seed", type=int, default=SEED, metavar="S", help="of the first image")
-    parser.add_argument("--only", metavar="NAME", help="one image: random blobs/round/5017")
-    parser.add_argument("--save", type=Path, metavar="DIR", help="with --only: write image and overlay here")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write every row")
-    parser.add_argument("--processes", type=int, default=min(2, os.cpu_count() or 1), metavar="N")
-    options = parser.parse_args(arguments)
-    if options.only:
+    Args:
+        seed: of the first image.
+        only: one image, as "random blobs/round/5017"; it is read alone.
+        save: with --only: a folder for the image and its overlay.
+    """
+    if only:
         try:
-            result = read_one_image(parse_case(options.only), options.save)
+            read = read_case(parse_case(only), 1, timing=False)
         except ValueError as error:
-            parser.error(str(error))
-        return int(result.score.wrong > 0 or result.raised)
-    started = time.perf_counter()
-    rows = totals_by_kind(with_progress(sample_cases(options.images, options.seed), options.processes))
-    print(totals_table(rows))
-    print(calibration_table(rows))
-    last = options.seed + options.images - 1
-    print(f"{options.images} images, seeds {options.seed} to {last}; {time.perf_counter() - started:.0f} s")
-    if options.json:
-        write_json(rows, options.json)
-    return int(any(row.wrong or row.raised for row in rows))
+            raise OptionError(error) from None
+        yield "\n    ".join([result_line(read.result), *notable_lines(read.shot, read.markers)])
+        if save:
+            save_image(read, save)
+        return Found(failed=read.result.score.wrong > 0 or read.result.raised)
+    rows = totals_by_kind(results_of(read_damaged, sample_cases(images, seed), processes))
+    yield totals_table(rows)
+    yield from wrong_lines(rows[-1])
+    found: dict[str, Calibration] = {
+        f"{row.kind}: {position}": stated for row in rows for position, stated in row.calibrations.items()
+    }
+    yield calibration_table("errors over covariances", found)
+    yield f"{images} images, seeds {seed} to {seed + images - 1}"
+    return Found(failed=any(row.wrong or row.raised for row in rows))
 
+
+main = Experiment("damage", measure)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -1,34 +1,22 @@
 """Cold extraction: its time, and the growth of the time with the pixels and with the markers, stage by stage.
 
-    python -m benchmarks.extraction [--quick] [--json FILE] [--publish]
-
 One core, every image new to the extractor (no previous frame is used). Found markers are counted too;
 ``benchmarks.accuracy`` measures their precision.
 """
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
-if __name__ == "__main__":  # before numpy: times are of one core
-    os.environ["OMP_NUM_THREADS"] = "1"
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
-
-import cv2
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
-from benchmarks.support.command import publishing_parser, wide_console
-from benchmarks.support.machine import conditions_text, write_json
-from benchmarks.support.published import write_published
-from benchmarks.support.scenes import WRONG_SHARE, shortest_edges
+from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.published import Page
+from benchmarks.frame.table import TEXT, Table
+from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Camera, Rendered, render, standard_layout, standard_scene
@@ -137,35 +125,20 @@ def fit_line(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     return float(intercept), float(slope)
 
 
-def make_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Table:
-    table = Table(
-        title=title, box=SIMPLE_HEAD, caption=caption or None, title_justify="left", caption_justify="left"
-    )
-    for number, column in enumerate(columns):
-        table.add_column(column, justify="left" if number == 0 else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*row)
-    return table
-
-
 def speed_table(title: str, results: Sequence[Speed], caption: str) -> Table:
     rows = [
-        (
-            r.name, f"{r.megapixels:.2f}", f"{r.measured}/{r.markers}", str(r.wrong), f"{r.median_ms:.1f}",
-            f"{r.p95_ms:.1f}", f"{r.best_ms:.1f}",
-        )
+        (r.name, r.megapixels, f"{r.measured}/{r.markers}", r.wrong, r.median_ms, r.p95_ms, r.best_ms)
         for r in results
-    ]  # fmt: skip
-    return make_table(
-        title, ("scene", "MP", "measured", "wrong", "median ms", "p95 ms", "best ms"), rows, caption
-    )
+    ]
+    columns = {"scene": TEXT, "MP": ".2f", "measured": "", "wrong": "d", "median ms": ".1f", "p95 ms": ".1f"}
+    return Table(title, columns | {"best ms": ".1f"}, rows, caption)
 
 
 def stage_table(results: Sequence[Speed]) -> Table:
     names = list(dict.fromkeys(name for result in results for name in result.stages_ms))
-    rows = [(name, *(f"{result.stages_ms.get(name, 0):.2f}" for result in results)) for name in names]
-    rows.append(("total", *(f"{result.median_ms:.2f}" for result in results)))
-    return make_table("Stages, median ms", ("stage", *(result.name for result in results)), rows)
+    rows = [(name, *(result.stages_ms.get(name, 0.0) for result in results)) for name in names]
+    rows.append(("total", *(result.median_ms for result in results)))
+    return Table("stages, median ms", {"stage": TEXT} | {result.name: ".2f" for result in results}, rows)
 
 
 def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str, Any]:
@@ -188,10 +161,10 @@ def growth(results: Sequence[Speed], unit: Callable[[Speed], float]) -> dict[str
 def growth_table(title: str, largest: Speed, grown: dict[str, Any]) -> Table:
     """The stages at the largest size, the slowest first."""
     rows = [
-        (stage, f"{ms:.1f}", f"{ms / largest.median_ms:.1%}", f"{grown['stages'][stage]:.2f}")
+        (stage, ms, ms / largest.median_ms, grown["stages"][stage])
         for stage, ms in sorted(largest.stages_ms.items(), key=lambda pair: -pair[1])
     ]
-    return make_table(title, ("stage", "ms", "share", "exponent"), rows)
+    return Table(title, {"stage": TEXT, "ms": ".1f", "share": ".1%", "exponent": ".2f"}, rows)
 
 
 def growth_text(unit: str, grown: dict[str, Any]) -> str:
@@ -202,41 +175,7 @@ def growth_text(unit: str, grown: dict[str, Any]) -> str:
     )
 
 
-def run_all(quick: bool) -> tuple[dict[str, Any], list[Table]]:
-    """All results, as data and as tables."""
-    runs = 7 if quick else 31
-    usual = standard_layout("honeycomb", LAYERS)
-    presets = [measure_speed(preset, usual, PITCH_PX, SIZE, 3 * runs, preset) for preset in PRESETS]
-    large = measure_speed(
-        "12 MP", standard_layout("honeycomb", 20), 70.0, image_size_px(12.0), max(3, runs // 4)
-    )
-    pixels, markers = measure_over_pixels(max(3, runs // 6)), measure_over_markers(max(3, runs // 6))
-    by_pixels, by_markers = growth(pixels, lambda r: r.megapixels), growth(markers, lambda r: r.markers)
-    results = {
-        "presets": {preset: asdict(result) for preset, result in zip(PRESETS, presets, strict=True)},
-        "large": asdict(large), "over_pixels": [asdict(r) for r in pixels],
-        "over_markers": [asdict(r) for r in markers],
-        "growth": {"megapixels": by_pixels, "markers": by_markers},
-    }  # fmt: skip
-    tables = [
-        speed_table(
-            "Cold extraction", [*presets, large], "presets at 640 x 480 px; one core, warm code, blur 1 px, noise 2/255"
-        ),
-        stage_table([*presets, large]),
-        speed_table(
-            "Growth with the image: 331 markers that grow along", pixels, growth_text("MP", by_pixels)
-        ),
-        growth_table(f"Stages at {pixels[-1].megapixels:.0f} MP", pixels[-1], by_pixels),
-        speed_table(
-            "Growth with the markers: edges of 20 px, the image grows along", markers,
-            growth_text("marker", by_markers),
-        ),
-        growth_table(f"Stages at {markers[-1].markers} markers", markers[-1], by_markers),
-    ]  # fmt: skip
-    return results, tables
-
-
-def markdown(results: dict[str, Any]) -> dict[str, str]:
+def page(results: dict[str, Any]) -> Page:
     """The tables of docs/explanation/accuracy.md, by block."""
     found = {}
     for name, key, unit in (("pixels", "over_pixels", "megapixels"), ("markers", "over_markers", "markers")):
@@ -253,25 +192,45 @@ def markdown(results: dict[str, Any]) -> dict[str, str]:
         lines += ["", f"Exponent {grown['exponent']:.2f}; over the larger half {grown['exponent_large']:.2f}. "
                   f"At the largest: {words}."]  # fmt: skip
         found[f"scaling-{name}"] = "\n".join(lines)
-    return found
+    return Page(found)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run, print the tables, write the JSON file if asked."""
-    options = publishing_parser("extraction", __doc__, "runs").parse_args(arguments)
-    cv2.setNumThreads(1)
-    results, tables = run_all(options.quick)
-    console = wide_console(100)
-    for table in tables:
-        console.print(table)
-    console.print(conditions_text(), style="dim", soft_wrap=True)
-    if options.json:
-        write_json(options.json, results)
-    if options.publish:
-        for path in write_published("extraction", results, markdown(results)):
-            console.print(f"wrote {path}")
-    return 0
+def measure(quick: bool = False) -> Shown:
+    """Presets, then growth with the pixels and with the markers.
 
+    Args:
+        quick: few runs.
+    """
+    runs = 7 if quick else 31
+    few = max(3, runs // 6)
+    usual = standard_layout("honeycomb", LAYERS)
+    presets = [measure_speed(preset, usual, PITCH_PX, SIZE, 3 * runs, preset) for preset in PRESETS]
+    large = measure_speed(
+        "12 MP", standard_layout("honeycomb", 20), 70.0, image_size_px(12.0), max(3, runs // 4)
+    )
+    pixels, markers = measure_over_pixels(few), measure_over_markers(few)
+    by_pixels, by_markers = growth(pixels, lambda r: r.megapixels), growth(markers, lambda r: r.markers)
+    told = "presets at 640 x 480 px; one core, warm code, blur 1 px, noise 2/255"
+    yield speed_table("cold extraction", [*presets, large], told)
+    yield stage_table([*presets, large])
+    title = "growth with the image: 331 markers that grow along"
+    yield speed_table(title, pixels, growth_text("MP", by_pixels))
+    yield growth_table(f"stages at {pixels[-1].megapixels:.0f} MP", pixels[-1], by_pixels)
+    title = "growth with the markers: edges of 20 px, the image grows along"
+    yield speed_table(title, markers, growth_text("marker", by_markers))
+    yield growth_table(f"stages at {markers[-1].markers} markers", markers[-1], by_markers)
+    return Found(
+        {
+            "presets": {preset: asdict(result) for preset, result in zip(PRESETS, presets, strict=True)},
+            "large": asdict(large),
+            "over_pixels": [asdict(r) for r in pixels],
+            "over_markers": [asdict(r) for r in markers],
+            "growth": {"megapixels": by_pixels, "markers": by_markers},
+        }
+    )
+
+
+main = Experiment("extraction", measure, page)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -1,11 +1,12 @@
-"""Laser jobs: travel against vpype, time to write all formats, areas over kerf. One run prints all figures.
+"""Laser jobs: travel against vpype, time to write all formats, areas over kerf.
 
-vpype needs old packages; therefore it is installed in its own environment on the first run.
+Travel is for 2,000 cells in three colors and one white, with the job's paths. Times are to all files of laser/ in
+memory, from a layout; processor time excludes waiting. Areas are as made at the front, honeycomb of 1.5 mm. vpype needs
+old packages; therefore it is installed in its own environment on the first run.
 """
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -17,12 +18,15 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import TEXT, Table
 from cmpdesign.design.design import Design, load_design
 from cmpdesign.layout.build import build_layout
 from cmpdesign.products.laser.as_made import measure_as_made
 from cmpdesign.products.laser.formats.drawing import job_drawing
 from cmpdesign.products.laser.formats.svg import drawing_to_svg
 from cmpdesign.products.laser.job import LaserJob, LaserPass, make_job
+from cmpdesign.products.laser.library import machines
 from cmpdesign.products.laser.make import make_laser
 from cmpdesign.products.laser.paths.beam import Points
 from cmpdesign.products.laser.paths.order import order_cells
@@ -76,14 +80,8 @@ def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
     program = VPYPE_HOME / "bin" / "vpype"
     if not program.exists():
         venv.create(VPYPE_HOME, with_pip=True)
-        pip = [
-            str(VPYPE_HOME / "bin" / "pip"),
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-            "vpype==1.15.0",
-        ]
-        subprocess.run(pip, check=True, capture_output=True)
+        pip = [str(VPYPE_HOME / "bin" / "pip"), "install", "--quiet", "--disable-pip-version-check"]
+        subprocess.run([*pip, "vpype==1.15.0"], check=True, capture_output=True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cells.svg"
         path.write_text(
@@ -99,12 +97,10 @@ def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
     return float(total.split(":")[1]) / PX_IN_MM, seconds
 
 
-def print_travel() -> None:
-    """Print the travel for 2,000 cells in three colors (and one white), with the job's paths."""
+def travel_table() -> Table:
+    """vpype's travel and the job's; the job's is at least 12 % shorter."""
     job = make_laser_job(make_design(26, laser__corner="plain", laser__holes="false"))
-    entries = [
-        laser_pass.cavities.entries_mm for laser_pass in job.cell_passes if laser_pass.cavities is not None
-    ]
+    entries = [one.cavities.entries_mm for one in job.cell_passes if one.cavities is not None]
     started = time.perf_counter()
     for cells in entries:
         order_cells(cells, "travel")
@@ -113,78 +109,66 @@ def print_travel() -> None:
     plain, plain_s = vpype_mm(job)
     best, best_s = vpype_mm(job, "--two-opt")
     own = travel_mm(job)
-    print(f"\ntravel on {sum(map(len, entries))} cells in {len(entries)} passes")
-    print(f"{'':34}{'m':>8}{'against two-opt':>18}{'s':>8}")
-    rows = [("vpype linesort", plain, plain_s), ("vpype linesort --two-opt", best, best_s)]
-    rows += [("cmpdesign", own, seconds), ("lower bound (nearest neighbours)", bound, 0.0)]
-    for name, length, seconds_of in rows:
-        print(f"{name:34}{length / 1000:8.3f}{100 * (length / best - 1):+17.1f} %{seconds_of:8.2f}")
     assert own < 0.88 * best, "at least 12 % below"
+    found = [("vpype linesort", plain, plain_s), ("vpype linesort --two-opt", best, best_s)]
+    found += [("cmpdesign", own, seconds), ("lower bound (nearest neighbours)", bound, 0.0)]
+    rows = [(name, length / 1000, 100 * (length / best - 1), spent_s) for name, length, spent_s in found]
+    title = f"travel on {sum(map(len, entries))} cells in {len(entries)} passes"
+    return Table(title, {"": TEXT, "m": ".3f", "% over two-opt": "+.1f", "s": ".2f"}, rows)
 
 
-def print_format_times() -> None:
-    """Print the time to make all files of the folder laser/ in memory, from a layout. CPU time excludes waiting."""
-    print("\ntime to everything in laser/ (figures, 4 formats, sheet, coupon), corners overcut")
-    print(f"{'cells':>8}{'files':>8}{'MB':>8}{'CPU s':>8}{'wall s':>8}{'limit s':>9}")
+def format_times_table() -> Table:
+    """Times within their limits, and the same bytes twice."""
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
         machine = Path(folder) / "co2-40w.toml"
-        from cmpdesign.products.laser.library import machines
-
-        text = machines()["co2-40w"].read_text()
-        machine.write_text(
-            text.replace("value = 300.0", "value = 900.0").replace(
-                'value = 200.0, source = "assumed: the common small',
-                'value = 600.0, source = "assumed: the common small',
-            )
-        )
+        text = machines()["co2-40w"].read_text().replace("value = 300.0", "value = 900.0")
+        small = 'value = 200.0, source = "assumed: the common small'
+        machine.write_text(text.replace(small, small.replace("200", "600")))
         for layers, limit in ((26, 3.0), (82, 30.0)):
             design = make_design(layers, laser__machine=str(machine), fiducials__count="3")
             layout = build_layout(design)
             started, begun = time.perf_counter(), time.process_time()
             files = make_laser(design, layout).files
             wall, seconds = time.perf_counter() - started, time.process_time() - begun
+            passes = make_job("", layout, complete_setup(design.laser)).cell_passes
             size = sum(len(content) for content in files.values()) / 1e6
-            cells = sum(
-                len(one.walls) for one in make_job("", layout, complete_setup(design.laser)).cell_passes
-            )
-            print(f"{cells:8d}{len(files):8d}{size:8.1f}{seconds:8.2f}{wall:8.2f}{limit:9.0f}")
+            rows.append((sum(len(one.walls) for one in passes), len(files), size, seconds, wall, limit))
             assert seconds < limit
             assert files == make_laser(design, layout).files, "the same bytes twice"
+    columns = {"cells": "d", "files": "d", "MB": ".1f", "CPU s": ".2f", "wall s": ".2f", "limit s": ".0f"}
+    return Table("all files of laser/ (figures, 4 formats, sheet, coupon), corners overcut", columns, rows)
 
 
-def print_areas() -> None:
-    """Print areas against the nominal cell of 1.5 mm, losses at corners, and burns outside the cell."""
-    print("\nas made at the front, honeycomb of 1.5 mm")
-    print(
-        f"{'kerf mm':>9}{'corner':>10}{'area %':>10}{'corner lost um':>16}{'beside um':>11}{'web um':>9}"
-        f"{'web to filled um':>18}"
-    )
+def areas_table() -> Table:
+    """Areas against the nominal cell, losses at corners, and burns outside the cell."""
+    rows = []
     for kerf in (0.03, 0.05, 0.1, 0.16, 0.25):
         for corner in ("plain", "overcut"):
-            job = make_laser_job(
-                make_design(4, laser__corner=corner, laser__kerf_mm=str(kerf), laser__taper_deg="0")
-            )
-            front = measure_as_made(job)[1].front
-            lengths = [
-                front.corner_loss_mm,
-                front.burnt_beside_mm,
-                front.web_mm or 0,
-                front.web_to_filled_mm or 0,
-            ]
-            row = "".join(
-                f"{1000 * value:{width}.1f}" for value, width in zip(lengths, (16, 11, 9, 18), strict=True)
-            )
-            print(f"{kerf:9.2f}{corner:>10}{front.area_error_percent:+10.3f}{row}")
+            options = {"laser__corner": corner, "laser__kerf_mm": str(kerf), "laser__taper_deg": "0"}
+            front = measure_as_made(make_laser_job(make_design(4, **options)))[1].front
+            lengths_mm = front.corner_loss_mm, front.burnt_beside_mm, front.web_mm, front.web_to_filled_mm
+            rows.append((corner, kerf, front.area_error_percent, *(1000 * (mm or 0) for mm in lengths_mm)))
             assert abs(front.area_error_percent) < 0.6 or (corner == "plain" and kerf > 0.1)
+    columns = {
+        "corner": TEXT,
+        "kerf mm": ".2f",
+        "area %": "+.3f",
+        "corner lost um": ".1f",
+        "beside um": ".1f",
+    }
+    return Table("as made", columns | {"web um": ".1f", "web to filled um": ".1f"}, rows)
 
 
-def main() -> None:
-    print(json.dumps({"python": sys.version.split()[0]}))
+def measure() -> Shown:
+    """All figures."""
     make_laser(make_design(3), build_layout(make_design(3)))  # loads what is loaded on first use
-    print_areas()
-    print_travel()
-    print_format_times()
+    yield areas_table()
+    yield travel_table()
+    yield format_times_table()
 
+
+main = Experiment("laser", measure)
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

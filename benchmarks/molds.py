@@ -1,9 +1,5 @@
 """Molds: time of each operation over the number of bosses, against boolean operations, and of whole processes.
 
-    python -m benchmarks.molds            plates, booleans, a pad of 22 layers
-    python -m benchmarks.molds --large    and a pad of 44 layers
-    python -m benchmarks.molds --quick    small plates and a small pad, as a test
-
 Times are of one core (user and system time, the least of some runs), because these depend less on the machine's load.
 Whole processes show wall time too. A large mold is made by two processes: its core seconds are the sum of both, its
 memory is that of the larger process.
@@ -11,7 +7,6 @@ memory is that of the larger process.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import os
 import subprocess
@@ -24,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import TEXT, Table
 from cmpdesign import build_layout, load
 from cmpdesign.patterns.colors import RED
 from cmpdesign.products.mold.parts import make_parts
@@ -148,79 +144,37 @@ def least_times(layers: int, runs: int) -> PlateFigures:
     return PlateFigures(found[0].bosses, seconds, max(figures.volume_error for figures in found))
 
 
-def measure_plates(quick: bool) -> dict[str, Any]:
-    """Measure and print boss plates, directly and by booleans."""
+def measure(quick: bool = False, large: bool = False) -> Shown:
+    """Plates, booleans, and whole processes.
+
+    Args:
+        quick: small plates and a small pad, as a test.
+        large: a pad of 44 layers, too.
+    """
     make_slab_solid(red_plate_slab(2))  # loads the kernel's libraries before times are measured
     many, compared = (QUICK_LAYERS, QUICK_BOOLEAN_LAYERS) if quick else (LAYERS, BOOLEAN_LAYERS)
-    print("Boss plates, seconds of one core")
-    print(
-        f"{'bosses':>8}" + "".join(f"{operation:>10}" for operation in OPERATIONS) + f"{'volume off by':>16}"
-    )
-    counts, table = [], []
-    for layers in many:
-        plate = least_times(layers, RUNS if layers <= compared and not quick else 1)
-        counts.append(plate.bosses)
-        table.append(plate.seconds)
-        row = "".join(f"{t:>10.3f}" for t in plate.seconds)
-        print(f"{plate.bosses:>8}{row}{plate.volume_error:>16.1e}", flush=True)
-    slopes = [float(np.polyfit(np.log(counts), np.log(column), 1)[0]) for column in np.array(table).T]
-    print(f"{'exponent':>8}" + "".join(f"{slope:>10.2f}" for slope in slopes) + f"   limit {EXPONENT_LIMIT}")
-    direct = table[many.index(compared)][1:]
-    boolean = measure_boolean(compared)
-    print(
-        f"\nBooleans, {compared**2} bosses"
-        + " " * 3
-        + "".join(f"{operation:>10}" for operation in OPERATIONS[1:])
-    )
-    print(f"{'boolean':>24}" + "".join(f"{t:>10.3f}" for t in boolean))
-    print(f"{'direct':>24}" + "".join(f"{t:>10.3f}" for t in direct))
-    print(
-        f"{'ratio':>24}" + "".join(f"{b / a:>10.1f}" for a, b in zip(direct, boolean, strict=True)),
-        flush=True,
-    )
-    seconds = {
-        bosses: dict(zip(OPERATIONS, times, strict=True)) for bosses, times in zip(counts, table, strict=True)
-    }
-    exponents = dict(zip(OPERATIONS, slopes, strict=True))
-    booleans = {compared**2: dict(zip(OPERATIONS[1:], boolean, strict=True))}
-    return {"seconds": seconds, "exponents": exponents, "booleans": booleans}
-
-
-def measure_processes(sizes: tuple[int, ...]) -> list[dict[str, Any]]:
-    """Measure and print whole processes for pads of these numbers of layers."""
-    print("\nWhole processes: cmpdesign build honeycomb --only mold")
-    print(f"{'layers':>8}{'cells':>8}{'wall s':>10}{'core s':>10}{'GB':>8}  digest of the files")
-    found = []
+    plates = {layers: least_times(layers, RUNS if layers <= compared and not quick else 1) for layers in many}
+    counts = np.log([plate.bosses for plate in plates.values()])
+    seconds = np.log([plate.seconds for plate in plates.values()])
+    slopes = [float(np.polyfit(counts, column, 1)[0]) for column in seconds.T]
+    rows = [(str(plate.bosses), *plate.seconds, plate.volume_error) for plate in plates.values()]
+    rows.append(("exponent", *slopes, None))
+    columns = {"bosses": TEXT, **dict.fromkeys(OPERATIONS, ".3f"), "volume off by": ".1e"}
+    yield Table("boss plates, seconds of one core", columns, rows, f"limit of exponents {EXPONENT_LIMIT}")
+    direct, boolean = plates[compared].seconds[1:], measure_boolean(compared)
+    ratios = [b / a for a, b in zip(direct, boolean, strict=True)]
+    found = [("boolean", *boolean), ("direct", *direct), ("ratio", *ratios)]
+    columns = {"": TEXT, **dict.fromkeys(OPERATIONS[1:], ".3f")}
+    yield Table(f"booleans, {compared**2} bosses", columns, found)
+    processes = []
     with tempfile.TemporaryDirectory() as folder:
-        for layers in sizes:
-            one = measure_process(layers, Path(folder))
-            times = f"{one.wall_s:>10.1f}{one.core_s:>10.1f}{one.memory_gb:>8.2f}"
-            print(f"{layers:>8}{3 * layers**2:>8}{times}  {one.digest}", flush=True)
-            found.append(
-                {
-                    "layers": layers,
-                    "wall_s": one.wall_s,
-                    "core_s": one.core_s,
-                    "gb": one.memory_gb,
-                    "digest": one.digest,
-                }
-            )
-    return found
+        for layers in (2, 2) if quick else (22, 22, 44) if large else (22, 22):
+            processes.append((layers, 3 * layers**2, *measure_process(layers, Path(folder))))
+    columns = {"layers": "d", "cells": "d", "wall s": ".1f", "core s": ".1f", "GB": ".2f", "digest": TEXT}
+    yield Table("whole processes: cmpdesign build honeycomb --only mold", columns, processes)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Molds: time, memory and growth.")
-    parser.add_argument("--quick", action="store_true", help="small plates and a small pad")
-    parser.add_argument("--large", action="store_true", help="a pad of 44 layers, too")
-    parser.add_argument("--json", type=Path, help="write conditions and figures to this file")
-    options = parser.parse_args()
-    print(conditions_text())
-    figures = measure_plates(options.quick)
-    sizes = (2, 2) if options.quick else (22, 22, 44) if options.large else (22, 22)
-    figures["processes"] = measure_processes(sizes)
-    if options.json:
-        write_json(options.json, figures)
-
+main = Experiment("molds", measure)
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

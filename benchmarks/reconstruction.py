@@ -1,7 +1,5 @@
 """The whole chain in space: two views are rendered, each is extracted, and the surface is triangulated.
 
-    python -m benchmarks.reconstruction [--quick] [--json FILE]
-
 The layout is the tac3d template (331 markers of pitch 1.5 mm, 4650 virtual ones) on an elastomer of 6 mm, seen from the
 back by two views that share one image, as behind mirrors. Poses come from a separate rest frame; intrinsics are
 known. Errors are RMS per axis against the scene's truth, over all markers and frames. They are compared with two
@@ -12,31 +10,20 @@ is reported for each marker. One core.
 
 from __future__ import annotations
 
-import argparse
-import os
-import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-os.environ["OMP_NUM_THREADS"] = "1"  # before numpy
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
-
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
 
-from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import TEXT, Table
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
-from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Optics, Pinhole, Plain, Scene, Sensor, cramer_rao, render
 from cmpdesign.scene.standard import BLACK_RGB, INKS
 from extractor import Reconstructor, Rig, View, ViewExtractor, parse_layout, triangulate
@@ -74,25 +61,11 @@ STATES: dict[str, tuple[Ball, Motion] | None] = {
 }
 
 
-@dataclass(frozen=True)
-class ReconstructionResult:
-    """The result for one sensor and state. Triples are x, y, z."""
-
-    sensor: str
-    state: str
-    frames: int
-    reported_share: float
-    error_um: tuple[float, ...]
-    stated_um: tuple[float, ...]
-    image_um: tuple[float, ...]
-    ratio_stated: float
-    ratio_image: float
-    normalised: float
-    displacement_um: tuple[float, ...]
-    virtual_um: tuple[float, ...]
-    normal_deg: float
-    extract_ms: float
-    reconstruct_ms: float
+COLUMNS = {
+    "state": TEXT, "reported": ".2%", "error um": ".2f", "stated um": ".2f", "image um": ".2f", "err/stated": ".2f",
+    "err/image": ".2f", "err/cov": ".2f", "moved um": ".2f", "virtual um": ".2f", "normal deg": ".2f",
+    "extract, reconstruct ms": ".0f",
+}  # fmt: skip
 
 
 def make_cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tuple[Pinhole, ...]:
@@ -120,137 +93,89 @@ def make_rig(views: tuple[Pinhole, ...]) -> Rig:
     return Rig(tuple(View(v.name, v.focal_px, v.centre_px, v.distortion, v.area_px) for v in views))
 
 
-def make_scene(layout: Layout, camera: tuple[Pinhole, ...], surface: Surface | None, seed: int) -> Scene:
-    return Scene(
-        layout=layout,
-        camera=camera,
-        surface=surface,
-        background=Plain(BLACK_RGB),
-        optics=Optics(1.0),
-        sensor=Sensor(noise=2.0),
-        inks=INKS,
-        seed=seed,
-    )
+@dataclass(frozen=True, eq=False)
+class RestedSensor:
+    """A sensor after its rest frame: the scene without surface, and what reads its images."""
 
+    scene: Scene
+    size: tuple[int, int]
+    extractor: ViewExtractor
+    reconstructor: Reconstructor
 
-def implied_deviation_um(
-    placed: list[View], xyz: Array, cov_px2: Array, shown: NDArray[np.bool_]
-) -> tuple[float, ...]:
-    """RMS deviation per axis that pixel covariances imply with exact poses of the views."""
-    pixels = np.stack([view.project(xyz) for view in placed])
-    cov = triangulate(placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
-    return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(cov, axis=0)))
+    @classmethod
+    def of(cls, setup: SensorSetup) -> RestedSensor:
+        layout = build_layout(load_design("tac3d"))
+        views = make_cameras(*setup)
+        scene = Scene(
+            layout=layout, camera=views, background=Plain(BLACK_RGB), optics=Optics(1.0), sensor=Sensor(noise=2.0),
+            inks=INKS, seed=1000,
+        )  # fmt: skip
+        reference = parse_layout(layout_to_json(layout))
+        extractor = ViewExtractor(reference, make_rig(views))
+        rest = extractor.extract(render(scene, size=setup.size).image)
+        return cls(scene, setup.size, extractor, Reconstructor(reference, extractor.rig, rest))
 
-
-def measure_sensor(name: str, frames: int) -> list[ReconstructionResult]:
-    """The results of all states of one sensor."""
-    size, angle_deg, distance_mm = SENSORS[name]
-    layout = build_layout(load_design("tac3d"))
-    reference = parse_layout(layout_to_json(layout))
-    views = make_cameras(size, angle_deg, distance_mm)
-    extractor = ViewExtractor(reference, make_rig(views))
-    reconstructor = Reconstructor(
-        reference,
-        extractor.rig,
-        extractor.extract(render(make_scene(layout, views, None, 1000), size=size).image),
-    )
-    placed = [
-        View(
-            v.name,
-            v.focal_px,
-            v.centre_px,
-            v.distortion,
-            v.area_px,
-            None,
-            v.R_camera_from_layout,
-            v.t_camera_from_layout_mm,
-        )
-        for v in views
-    ]
-    results = []
-    for state, contact in STATES.items():
-        surface = None if contact is None else solve(ELASTOMER, *contact).surface()
-        results.append(
-            _measure_state(
-                name,
-                state,
-                make_scene(layout, views, surface, 0),
-                size,
-                frames,
-                extractor,
-                reconstructor,
-                placed,
+    @property
+    def placed(self) -> list[View]:
+        """The views with their true poses."""
+        return [
+            View(
+                v.name, v.focal_px, v.centre_px, v.distortion, v.area_px, None, v.R_camera_from_layout,
+                v.t_camera_from_layout_mm,
             )
+            for v in self.scene.camera
+        ]  # fmt: skip
+
+    def implied_deviation_um(self, xyz: Array, cov_px2: Array, shown: NDArray[np.bool_]) -> tuple[float, ...]:
+        """RMS deviation per axis that pixel covariances imply with exact poses of the views."""
+        pixels = np.stack([view.project(xyz) for view in self.placed])
+        cov = triangulate(self.placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
+        return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(cov, axis=0)))
+
+    def state_row(self, state: str, surface: Surface | None, frames: int) -> tuple[object, ...]:
+        """The row of ``COLUMNS``."""
+        shown = replace(self.scene, surface=surface)
+        errors, cov, stated, moved, virtual, tilts, times = [], [], [], [], [], [], []
+        xy_mm = self.reconstructor.layout.xy_mm
+        flat = np.column_stack([xy_mm, np.zeros(len(xy_mm))])
+        for seed in range(frames):
+            shot = render(replace(shown, seed=seed), size=self.size)
+            begin = time.perf_counter()
+            markers = self.extractor.extract(shot.image)
+            middle = time.perf_counter()
+            shape = self.reconstructor.reconstruct(markers)
+            times.append((middle - begin, time.perf_counter() - middle))
+            true = shot.truth.marker_xyz_mm
+            errors.append(shape.xyz_mm - true)
+            cov.append(shape.cov_mm2)
+            known = np.isfinite(shape.xyz_mm[:, 0])
+            stated.append(self.implied_deviation_um(true, np.stack([m.cov_px2 for m in markers]), known))
+            moved.append(shape.displacement_mm - (true - flat))
+            virtual.append((shape.virtual_xyz_mm - shot.truth.virtual_xyz_mm).reshape(-1, 3))
+            tilts.append(angles_deg(shape.normals, xy_mm, surface))
+        error, covs = np.concatenate(errors), np.concatenate(cov)
+        known = np.isfinite(error[:, 0])
+        bounds = np.stack(
+            [cramer_rao(replace(shown, camera=camera), size=self.size) for camera in shown.camera]
         )
-    return results
+        image_um = self.implied_deviation_um(true, bounds, known[: len(true)])
+        found_um = rms_um(error)
+        stated_um = tuple(float(v) for v in np.sqrt(np.mean(np.square(stated), axis=0)))
+        squares = np.einsum("ni,nij,nj->n", error[known], np.linalg.inv(covs[known]), error[known]) / 3
+        return (
+            state, float(known.mean()), found_um, stated_um, image_um, bound_ratio(found_um, stated_um),
+            bound_ratio(found_um, image_um), float(np.sqrt(squares.mean())), rms_um(np.concatenate(moved)),
+            rms_um(np.concatenate(virtual)), float(np.sqrt(np.nanmean(np.square(tilts)))),
+            tuple(1e3 * np.median(times, axis=0)),
+        )  # fmt: skip
 
 
-def _measure_state(
-    name: str,
-    state: str,
-    shown: Scene,
-    size: tuple[int, int],
-    frames: int,
-    extractor: ViewExtractor,
-    reconstructor: Reconstructor,
-    placed: list[View],
-) -> ReconstructionResult:
-    errors, cov, stated, moved, virtual, tilts, times = [], [], [], [], [], [], []
-    flat = np.column_stack([reconstructor.layout.xy_mm, np.zeros(len(reconstructor.layout.xy_mm))])
-    for seed in range(frames):
-        shot = render(replace(shown, seed=seed), size=size)
-        begin = time.perf_counter()
-        markers = extractor.extract(shot.image)
-        middle = time.perf_counter()
-        shape = reconstructor.reconstruct(markers)
-        times.append((middle - begin, time.perf_counter() - middle))
-        true = shot.truth.marker_xyz_mm
-        errors.append(shape.xyz_mm - true)
-        cov.append(shape.cov_mm2)
-        known = np.isfinite(shape.xyz_mm[:, 0])
-        stated.append(implied_deviation_um(placed, true, np.stack([m.cov_px2 for m in markers]), known))
-        moved.append(shape.displacement_mm - (true - flat))
-        virtual.append((shape.virtual_xyz_mm - shot.truth.virtual_xyz_mm).reshape(-1, 3))
-        tilts.append(_angles_deg(shape.normals, reconstructor, shown))
-    error, covs = np.concatenate(errors), np.concatenate(cov)
-    known = np.isfinite(error[:, 0])
-    image = implied_deviation_um(
-        placed, true, np.stack([_image_bound(shown, v, size) for v in shown.camera]), known[: len(true)]
-    )  # type: ignore[union-attr]
-    found = rms_um(error)
-    stated_um = tuple(float(v) for v in np.sqrt(np.mean(np.square(stated), axis=0)))
-    squares = np.einsum("ni,nij,nj->n", error[known], np.linalg.inv(covs[known]), error[known]) / 3
-    extract_ms, reconstruct_ms = 1e3 * np.median(times, axis=0)
-    return ReconstructionResult(
-        sensor=name,
-        state=state,
-        frames=frames,
-        reported_share=float(known.mean()),
-        error_um=found,
-        stated_um=stated_um,
-        image_um=image,
-        ratio_stated=bound_ratio(found, stated_um),
-        ratio_image=bound_ratio(found, image),
-        normalised=float(np.sqrt(squares.mean())),
-        displacement_um=rms_um(np.concatenate(moved)),
-        virtual_um=rms_um(np.concatenate(virtual)),
-        normal_deg=float(np.sqrt(np.nanmean(np.square(tilts)))),
-        extract_ms=float(extract_ms),
-        reconstruct_ms=float(reconstruct_ms),
-    )
-
-
-def _image_bound(shown: Scene, camera: Pinhole, size: tuple[int, int]) -> Array:
-    return cramer_rao(replace(shown, camera=camera), size=size)
-
-
-def _angles_deg(normals: Array, reconstructor: Reconstructor, shown: Scene) -> Array:
+def angles_deg(normals: Array, xy_mm: Array, surface: Surface | None) -> Array:
     """(M,) angles between the normals found and those of the true surface, by central differences."""
-    xy, step = reconstructor.layout.xy_mm, 1e-4
-    if shown.surface is None:
-        true = np.tile([0.0, 0.0, 1.0], (len(xy), 1))
+    if surface is None:
+        true = np.tile([0.0, 0.0, 1.0], (len(xy_mm), 1))
     else:
-        by_x, by_y = (shown.surface(xy + s) - shown.surface(xy - s) for s in step * np.eye(2))
+        by_x, by_y = (surface(xy_mm + s) - surface(xy_mm - s) for s in 1e-4 * np.eye(2))
         true = np.cross(by_x, by_y)
         true /= np.linalg.norm(true, axis=1, keepdims=True)
     return np.degrees(np.arcsin(np.clip(np.linalg.norm(np.cross(normals, true), axis=1), 0, 1)))
@@ -266,44 +191,23 @@ def bound_ratio(error_um: tuple[float, ...], bound_um: tuple[float, ...]) -> flo
     return float(np.sqrt(np.mean(np.square(error_um) / np.square(bound_um))))
 
 
-def results_table(results: list[ReconstructionResult]) -> Table:
-    shown = Table(box=SIMPLE_HEAD, title=results[0].sensor)
-    for heading in (
-        "state", "reported", "error um", "stated um", "image um", "err/stated", "err/image", "err/cov",
-        "moved um", "virtual um", "normal deg", "ms",
-    ):  # fmt: skip
-        shown.add_column(
-            heading, justify="left" if heading == "state" else "right", no_wrap=heading != "state"
-        )
-    for r in results:
-        shown.add_row(
-            r.state,
-            f"{r.reported_share:.2%}",
-            *(" ".join(f"{v:.2f}" for v in triple) for triple in (r.error_um, r.stated_um, r.image_um)),
-            *(f"{v:.2f}" for v in (r.ratio_stated, r.ratio_image, r.normalised)),
-            *(" ".join(f"{v:.2f}" for v in triple) for triple in (r.displacement_um, r.virtual_um)),
-            f"{r.normal_deg:.2f}",
-            f"{r.extract_ms:.0f}+{r.reconstruct_ms:.0f}",
-        )
-    return shown
+def measure(quick: bool = False) -> Shown:
+    """One table for every sensor, one row for every state.
+
+    Args:
+        quick: two frames of each state.
+    """
+    frames = QUICK_FRAMES if quick else FRAMES
+    for name, setup in SENSORS.items():
+        sensor = RestedSensor.of(setup)
+        rows = []
+        for state, contact in STATES.items():
+            surface = None if contact is None else solve(ELASTOMER, *contact).surface()
+            rows.append(sensor.state_row(state, surface, frames))
+        yield Table(name, COLUMNS, rows)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help=f"{QUICK_FRAMES} frames of each state")
-    parser.add_argument("--json", type=Path, help="also write the results here")
-    options = parser.parse_args()
-    cv2.setNumThreads(1)
-    frames = QUICK_FRAMES if options.quick else FRAMES
-    console, results = Console(width=190), []
-    for name in SENSORS:
-        found = measure_sensor(name, frames)
-        console.print(results_table(found))
-        results += found
-    console.print(conditions_text())
-    if options.json:
-        write_json(options.json, {"results": [asdict(result) for result in results]})
-
+main = Experiment("reconstruction", measure)
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -1,7 +1,5 @@
 """Tracking over a long sequence: ids, error and time, compared with Lucas-Kanade optical flow on the same frames.
 
-    python -m benchmarks.tracking [--quick] [--json FILE] [--plot FILE.png]
-
 2,000 frames of 640x480 and 331 markers (quick: 120), pressed, twisted, sheared and moved. In the second
 sequence the pattern also jumps at times by most of an edge, and some frames are black. Optical flow
 starts from the true positions of the first frame. An id is wrong if its marker is nearer to another marker's true
@@ -10,28 +8,18 @@ position than to its own. Errors are per axis against the scene's truth. One cor
 
 from __future__ import annotations
 
-import argparse
-import os
-import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
 from itertools import islice
-from pathlib import Path
-from typing import Any, NamedTuple
-
-os.environ["OMP_NUM_THREADS"] = "1"  # before numpy
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # also as a script, from anywhere
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
 from scipy.spatial import cKDTree
 
-from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import TEXT, Table
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import (
@@ -57,38 +45,7 @@ BLOCKS = 10  # rows of the table
 PERIOD = 90  # frames of a whole cycle of motion
 JUMP_EVERY, BLACK_EVERY, BLACK_FRAMES = 97, 331, 4
 SIZE = (640, 480)
-
-
-@dataclass(frozen=True)
-class ErrorBlock:
-    """Errors of some frames: RMS per axis in px and wrong ids, of the tracker and of optical flow."""
-
-    first: int
-    last: int
-    rms_px: float
-    worst_px: float
-    lost: int
-    wrong: int
-    flow_rms_px: float
-    flow_wrong: int
-
-
-@dataclass(frozen=True)
-class TrackingResult:
-    """A sequence: its blocks, numbers of warm and cold starts, and times of the tracker in ms."""
-
-    name: str
-    frames: int
-    markers: int
-    blocks: list[ErrorBlock]
-    warm_frames: int
-    cold_frames: int
-    not_tracked: int
-    warm_ms: dict[str, float]
-    warm_cpu_ms: dict[str, float]
-    cold_ms: dict[str, float]
-    flow_ms: float
-    largest_step_px: float
+Points = NDArray[np.float64]
 
 
 class TrackedFrame(NamedTuple):
@@ -108,6 +65,16 @@ class FrameErrors(NamedTuple):
     wrong: int
     flow_squared: float
     flow_wrong: int
+
+
+class Followed(NamedTuple):
+    """A sequence: errors of its frames, times of the tracker in ms by how it started, and the flow's mean time."""
+
+    rows: list[FrameErrors]
+    times_ms: dict[str, list[float]]
+    not_tracked: int
+    flow_ms: float
+    largest_step_px: float
 
 
 def render_sequence(layout: Layout, count: int, jerky: bool) -> Iterator[Rendered]:
@@ -190,20 +157,17 @@ def track_frames(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[Track
         yield from found
 
 
-def measure_sequence(name: str, layout: Layout, count: int, jerky: bool) -> TrackingResult:
-    """Track the sequence with the tracker and with optical flow."""
-    tracker = Tracker(parse_layout(layout_to_json(layout)))
+def follow(tracker: Tracker, frames: Iterator[Rendered]) -> Followed:
+    """Track the frames with the tracker and with optical flow."""
     rows: list[FrameErrors] = []
-    times: dict[str, list[float]] = {"warm": [], "cpu": [], "cold": []}
+    times: dict[str, list[float]] = {"warm": [], "warm, CPU time": [], "cold": []}
     flow: OpticalFlow | None = None
     flow_s, step_px, failed, before = 0.0, 0.0, 0, None
-    for index, (rendered, frame, cpu) in enumerate(
-        track_frames(tracker, render_sequence(layout, count, jerky))
-    ):
+    for index, (rendered, frame, cpu_ms) in enumerate(track_frames(tracker, frames)):
         true, image = rendered.truth.marker_xy_px, np.asarray(rendered.image, np.uint8)
         if frame.start is StartKind.WARM:
             times["warm"].append(frame.elapsed_ms)
-            times["cpu"].append(cpu)
+            times["warm, CPU time"].append(cpu_ms)
         elif frame.start is StartKind.COLD and index:  # the first frame loads code
             times["cold"].append(frame.elapsed_ms)
         failed += frame.status is not FrameStatus.TRACKED
@@ -211,61 +175,41 @@ def measure_sequence(name: str, layout: Layout, count: int, jerky: bool) -> Trac
         start = time.perf_counter()
         flowed = flow.track(image)
         flow_s += time.perf_counter() - start
-        error = frame.markers.xy_px - true
-        squares = error[np.isfinite(error)] ** 2
-        rows.append(
-            FrameErrors(
-                squared=float(squares.mean()) if len(squares) else np.nan,
-                worst=float(np.sqrt(np.nanmax((error**2).sum(axis=1)))) if len(squares) else np.nan,
-                lost=int((~np.isfinite(error[:, 0])).sum()),
-                wrong=wrong_ids(frame.markers.xy_px, true),
-                flow_squared=float(np.mean((flowed - true) ** 2)),
-                flow_wrong=wrong_ids(flowed, true),
-            )
-        )
-        step_px = (
-            step_px if before is None else max(step_px, float(np.linalg.norm(true - before, axis=1).max()))
-        )
+        rows.append(frame_errors(frame.markers.xy_px, flowed, true))
+        if before is not None:
+            step_px = max(step_px, float(np.linalg.norm(true - before, axis=1).max()))
         before = true
-    return TrackingResult(
-        name=name,
-        frames=count,
-        markers=len(layout.marker_layer),
-        blocks=_error_blocks(rows),
-        warm_frames=len(times["warm"]),
-        cold_frames=len(times["cold"]) + 1,
-        not_tracked=failed,
-        warm_ms=percentiles(times["warm"]),
-        warm_cpu_ms=percentiles(times["cpu"]),
-        cold_ms=percentiles(times["cold"]),
-        flow_ms=1e3 * flow_s / count,
-        largest_step_px=step_px,
+    return Followed(rows, times, failed, 1e3 * flow_s / len(rows), step_px)
+
+
+def frame_errors(xy_px: Points, flowed_px: Points, true_px: Points) -> FrameErrors:
+    error = xy_px - true_px
+    squares = error[np.isfinite(error)] ** 2
+    return FrameErrors(
+        squared=float(squares.mean()) if len(squares) else np.nan,
+        worst=float(np.sqrt(np.nanmax((error**2).sum(axis=1)))) if len(squares) else np.nan,
+        lost=int((~np.isfinite(error[:, 0])).sum()),
+        wrong=wrong_ids(xy_px, true_px),
+        flow_squared=float(np.mean((flowed_px - true_px) ** 2)),
+        flow_wrong=wrong_ids(flowed_px, true_px),
     )
 
 
-def percentiles(values: Sequence[float]) -> dict[str, float]:
-    found = np.percentile(values, (50, 95, 99)) if len(values) else np.full(3, np.nan)
-    return dict(zip(("p50", "p95", "p99"), (float(v) for v in found), strict=True))
-
-
-def _error_blocks(rows: Sequence[FrameErrors]) -> list[ErrorBlock]:
-    blocks = []
+def error_table(name: str, rows: Sequence[FrameErrors]) -> Table:
+    """Errors by tenths of the sequence: RMS per axis in px and wrong ids, of the tracker and of optical flow."""
+    shown = []
     for numbers in np.array_split(np.arange(len(rows)), BLOCKS):
         block = [rows[number] for number in numbers]
         tracked = [row for row in block if np.isfinite(row.squared)]
-        blocks.append(
-            ErrorBlock(
-                first=int(numbers[0]),
-                last=int(numbers[-1]),
-                rms_px=float(np.sqrt(np.mean([row.squared for row in tracked]))),
-                worst_px=max(row.worst for row in tracked),
-                lost=sum(row.lost for row in block),
-                wrong=sum(row.wrong for row in block),
-                flow_rms_px=float(np.sqrt(np.mean([row.flow_squared for row in block]))),
-                flow_wrong=sum(row.flow_wrong for row in block),
-            )
-        )
-    return blocks
+        shown.append((
+            f"{numbers[0]}-{numbers[-1]}", float(np.sqrt(np.mean([row.squared for row in tracked]))),
+            max(row.worst for row in tracked), sum(row.lost for row in block), sum(row.wrong for row in block),
+            float(np.sqrt(np.mean([row.flow_squared for row in block]))), sum(row.flow_wrong for row in block),
+        ))  # fmt: skip
+    halves = ("2nd half / 1st", *(error_growth([row[column] for row in shown]) for column in (1, 5)))
+    columns = {"frames": TEXT, "RMS px": ".4f", "worst px": ".3f", "lost": "d", "wrong ids": "d"}
+    columns |= {"flow: RMS px": ".3f", "flow: wrong ids": "d"}
+    return Table(name, columns, [*shown, (*halves[:2], None, None, None, halves[2], None)])
 
 
 def error_growth(rms_px: Sequence[float]) -> float:
@@ -274,83 +218,38 @@ def error_growth(rms_px: Sequence[float]) -> float:
     return float(np.sqrt(halves[1].mean() / halves[0].mean()))
 
 
-def result_tables(result: TrackingResult) -> list[Table]:
-    errors = Table(box=SIMPLE_HEAD, title=f"{result.name}: {result.frames} frames, {result.markers} markers")
-    for heading in ("frames", "RMS px", "worst px", "lost", "wrong ids", "flow: RMS px", "wrong ids"):
-        errors.add_column(heading, justify="right")
-    for block in result.blocks:
-        numbers = (f"{block.rms_px:.4f}", f"{block.worst_px:.3f}", f"{block.lost}", f"{block.wrong}")
-        errors.add_row(
-            f"{block.first}-{block.last}", *numbers, f"{block.flow_rms_px:.3f}", f"{block.flow_wrong}"
-        )
-    ratios = [
-        error_growth([getattr(block, name) for block in result.blocks]) for name in ("rms_px", "flow_rms_px")
+def time_table(name: str, found: Followed) -> Table:
+    """Frames and times by how the tracker started."""
+    rows: list[tuple[object, ...]] = []
+    for start, times_ms in found.times_ms.items():
+        percentiles = np.percentile(times_ms, (50, 95, 99)) if len(times_ms) else np.full(3, np.nan)
+        rows.append((start, len(times_ms) + (start == "cold"), *map(float, percentiles)))
+    rows += [
+        ("not tracked", found.not_tracked, *[None] * 3),
+        ("optical flow", len(found.rows), found.flow_ms, *[None] * 2),
     ]
-    errors.add_row("2nd half / 1st", f"{ratios[0]:.2f}", "", "", "", f"{ratios[1]:.2f}", "")
-    speed = Table(
-        box=SIMPLE_HEAD, caption=f"largest step between frames {result.largest_step_px:.1f} px (pitch 20 px)"
+    columns = {"start": TEXT, "frames": "d", "p50 ms": ".2f", "p95 ms": ".2f", "p99 ms": ".2f"}
+    step = (
+        f"largest step between frames {found.largest_step_px:.1f} px (pitch 20 px); of optical flow the mean"
     )
-    for heading in ("start", "frames", "p50 ms", "p95 ms", "p99 ms"):
-        speed.add_column(heading, justify="right")
-    for name, count, times in (
-        ("warm", result.warm_frames, result.warm_ms),
-        ("warm, CPU time", result.warm_frames, result.warm_cpu_ms),
-        ("cold", result.cold_frames, result.cold_ms),
-    ):
-        speed.add_row(name, f"{count}", *(f"{value:.2f}" for value in times.values()))
-    speed.add_row("not tracked", f"{result.not_tracked}", "", "", "")
-    speed.add_row("optical flow", f"{result.frames}", f"{result.flow_ms:.2f} mean", "", "")
-    return [errors, speed]
+    return Table(f"{name}, times", columns, rows, step)
 
 
-def plot_errors(results: Sequence[TrackingResult], path: Path) -> None:
-    """Plot the error of both methods over frames on a logarithmic scale."""
-    import matplotlib
+def measure(quick: bool = False) -> Shown:
+    """Errors and times of both sequences.
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(
-        1, len(results), figsize=(5 * len(results), 3.6), sharey=True, squeeze=False
-    )
-    for axis, result in zip(axes[0], results, strict=True):
-        at = [(block.first + block.last) / 2 for block in result.blocks]
-        axis.semilogy(at, [b.flow_rms_px for b in result.blocks], "o-", color="#c05020", label="Lucas-Kanade")
-        axis.semilogy(
-            at, [b.rms_px for b in result.blocks], "s-", color="#2060a0", label="numbered in every frame"
-        )
-        axis.set(title=result.name, xlabel="frame", ylabel="RMS error per axis, px")
-        axis.grid(True, which="both", alpha=0.3)
-    axes[0][0].legend()
-    figure.tight_layout()
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-    pyplot.close(figure)
+    Args:
+        quick: 120 frames.
+    """
+    count, layout = QUICK_FRAMES if quick else FRAMES, standard_layout(layers=10)
+    for name, jerky in (("smooth", False), ("with jumps and black frames", True)):
+        tracker = Tracker(parse_layout(layout_to_json(layout)))
+        found = follow(tracker, render_sequence(layout, count, jerky))
+        yield error_table(f"{name}, {count} frames, {len(layout.marker_layer)} markers", found.rows)
+        yield time_table(name, found)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help=f"{QUICK_FRAMES} frames")
-    parser.add_argument("--json", type=Path, help="also write the results here")
-    parser.add_argument("--plot", type=Path, help="draw the errors here, as PNG")
-    options = parser.parse_args()
-    cv2.setNumThreads(1)
-    count = QUICK_FRAMES if options.quick else FRAMES
-    layout = standard_layout(layers=10)
-    results = [
-        measure_sequence("smooth", layout, count, False),
-        measure_sequence("with jumps and black frames", layout, count, True),
-    ]
-    console = Console(width=100)
-    for result in results:
-        for table in result_tables(result):
-            console.print(table)
-    console.print(conditions_text())
-    figures: dict[str, Any] = {"sequences": [asdict(result) for result in results]}
-    if options.json:
-        write_json(options.json, figures)
-    if options.plot:
-        plot_errors(results, options.plot)
-
+main = Experiment("tracking", measure)
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -7,6 +7,7 @@ Every command has its call:
     cmpdesign.render(design.layout, noise=2)        a picture with its exact truth
     cmpdesign.verify("layout.json", "photo.png")    a verdict on a picture; extractor.Extractor reads without a verdict
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
+    cmpdesign.open_sensor("thumb.toml", "index.toml")     sensors of a robot: the newest result, and what was dropped
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
     cmpdesign.kerf, laser_grid, calibrate_camera, calibrate_pattern, run_experiment, export_lerobot, export_zarr
 
@@ -17,7 +18,8 @@ The rooms of the package, each of which imports only rooms above it, left column
     layout    markers, cells, edges; checks        proposal  a design for a camera
     files     layout.json, images, videos          tracking  markers of videos and cameras as tables
     products  drawings, lasers, molds, prints      evaluate  the article's experiments, simulated
-    reading   layouts and pictures verified        data      data sets made on many machines
+    reading   layouts and pictures verified        runtime   sensors of a robot, opened once
+                                                   data      data sets made on many machines
                                                    api, cli  the calls, and the command line
 
 Public names are loaded at their first use, so that ``import cmpdesign`` takes milliseconds.
@@ -73,6 +75,14 @@ if TYPE_CHECKING:
     from cmpdesign.layout.checks import check_design as check_design
     from cmpdesign.products.drawing.svg import write_svg as write_svg
     from cmpdesign.proposal.camera_design import size as size
+    from cmpdesign.runtime.health import Health as Health
+    from cmpdesign.runtime.opening import Sensors as Sensors
+    from cmpdesign.runtime.opening import open_sensor as open_sensor
+    from cmpdesign.runtime.result import SensorFrame as SensorFrame
+    from cmpdesign.runtime.result import SensorFrames as SensorFrames
+    from cmpdesign.runtime.sensor import LateError as LateError
+    from cmpdesign.runtime.sensor import Sensor as Sensor
+    from cmpdesign.runtime.zero import TouchedError as TouchedError
     from cmpdesign.tracking.jobs.options import SequenceOptions as SequenceOptions
     from cmpdesign.tracking.jobs.options import ShapeOptions as ShapeOptions
     from cmpdesign.tracking.jobs.options import TrackOptions as TrackOptions
@@ -84,11 +94,18 @@ _HOMES = {
     "CmpDesignError": "cmpdesign.errors",
     "Design": "cmpdesign.api.designs",
     "DesignError": "cmpdesign.errors",
+    "Health": "cmpdesign.runtime.health",
     "InputError": "cmpdesign.errors",
+    "LateError": "cmpdesign.runtime.sensor",
     "Layout": "cmpdesign.api.layouts",
     "OutputError": "cmpdesign.errors",
+    "Sensor": "cmpdesign.runtime.sensor",
+    "SensorFrame": "cmpdesign.runtime.result",
+    "SensorFrames": "cmpdesign.runtime.result",
+    "Sensors": "cmpdesign.runtime.opening",
     "SequenceOptions": "cmpdesign.tracking.jobs.options",
     "ShapeOptions": "cmpdesign.tracking.jobs.options",
+    "TouchedError": "cmpdesign.runtime.zero",
     "TrackOptions": "cmpdesign.tracking.jobs.options",
     "Verifier": "cmpdesign.api.pictures",
     "build_layout": "cmpdesign.api.layouts",
@@ -109,6 +126,7 @@ _HOMES = {
     "load": "cmpdesign.api.designs",
     "load_run": "cmpdesign.api.sequences",
     "load_scene": "cmpdesign.api.pictures",
+    "open_sensor": "cmpdesign.runtime.opening",
     "open_source": "cmpdesign.api.sequences",
     "plot_displacement": "cmpdesign.api.plots",
     "plot_history": "cmpdesign.api.plots",

@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -321,19 +321,16 @@ class Extractor:
         repaired = repair_markers(refined, places, pad.lattice, size)
         rows = find_row_break(topology, repaired, size)
         repaired = stages.record("repair", beside_row_break(rows, repaired))
-        located = locate_virtual_markers(topology, repaired, refined.points, refined.scatter)
-        virtual = stages.record("virtual", located)
+        virtual = partial(locate_virtual_markers, topology, repaired, refined.points, refined.scatter)
         few = is_less_than_half_reported(repaired.xy_px, layout.xy_mm, pad.lattice.present, size)
         view, edges = pyramid.level(1), topology.edges
         quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)
         quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
-        markers = Markers(
+        markers = Markers.with_later(
+            virtual,
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,
             status=repaired.status,
-            virtual_xy_px=virtual.xy_px,
-            virtual_cov_px2=virtual.cov_px2,
-            virtual_status=virtual.status,
             mirrored=numbered.mirrored,
             origin=numbered.origin,
             reason=Reason.FEW_MARKERS if few else None,

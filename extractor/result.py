@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from enum import IntEnum, StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,22 @@ _REASON_TEXTS = {
 }
 
 
+class VirtualMarkers(NamedTuple):
+    """m virtual markers on each of E edges.
+
+    Attributes:
+        xy_px, cov_px2: (E, m, 2) and (E, m, 2, 2) float64, NaN where lost.
+        status: (E, m) uint8, a ``VirtualStatus`` each.
+    """
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    status: NDArray[np.uint8]
+
+
+_NO_VIRTUAL = VirtualMarkers(np.empty((0, 0, 2)), np.empty((0, 0, 2, 2)), np.empty((0, 0), np.uint8))
+
+
 @dataclass(frozen=True, eq=False)
 class Markers(FrozenRecord):
     """The M markers of one image by id, and m virtual markers on each of E edges. Can be pickled and copied.
@@ -100,7 +116,8 @@ class Markers(FrozenRecord):
         virtual_xy_px: (E, m, 2) float64, in the order of the layout's edges, from the smaller id; NaN where lost.
         virtual_cov_px2: (E, m, 2, 2) float64, NaN where lost.
         virtual_status: (E, m) uint8, a ``VirtualStatus`` each: measured across the gridline (every virtual marker is
-            interpolated along it), or interpolated only.
+            interpolated along it), or interpolated only. An extractor's result computes the virtual markers when they
+            are first asked for.
         mirrored: whether the image shows the pattern's back; None when no cell was numbered.
         reason: why no or few markers were found; None without a problem. ``FEW_MARKERS`` may come with markers.
         timings_ms: stage name -> milliseconds, read-only.
@@ -126,6 +143,41 @@ class Markers(FrozenRecord):
 
     def __post_init__(self) -> None:
         self._freeze_mappings("timings_ms", "stages")
+
+    @classmethod
+    def with_later(cls, virtual: Callable[[], VirtualMarkers], **fields: Any) -> Markers:
+        """Markers whose virtual markers are computed when they are first asked for, once.
+
+        Args:
+            virtual: computes them, from values that do not change.
+            fields: all other attributes.
+        """
+        made = cls(
+            **{name: getattr(_NO_VIRTUAL, name.removeprefix("virtual_")) for name in _VIRTUAL}, **fields
+        )
+        for name in _VIRTUAL:
+            del made.__dict__[name]
+        made.__dict__["_virtual"] = virtual
+        return made
+
+    if not TYPE_CHECKING:  # it is called for an attribute that is not there
+
+        def __getattr__(self, name: str) -> Any:
+            """A virtual marker's attribute, computed with the others at the first use."""
+            if name not in _VIRTUAL or "_virtual" not in self.__dict__:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            found = self._virtual()
+            self.__dict__.update({each: getattr(found, each.removeprefix("virtual_")) for each in _VIRTUAL})
+            return self.__dict__[name]
+
+    def moved(self, offset_px: tuple[float, float]) -> Markers:
+        """The same markers in a frame whose origin lies this offset (px) further left and up."""
+
+        def virtual() -> VirtualMarkers:
+            return VirtualMarkers(self.virtual_xy_px + offset_px, self.virtual_cov_px2, self.virtual_status)
+
+        others = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _VIRTUAL}
+        return Markers.with_later(virtual, **{**others, "xy_px": self.xy_px + offset_px})
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.counts.items())
@@ -162,3 +214,6 @@ class Markers(FrozenRecord):
         """The remedy of the reason, and the hints of the quality; empty without both."""
         reason = () if self.reason is None else (self.reason.text,)
         return reason + (() if self.quality is None else self.quality.hints)
+
+
+_VIRTUAL = ("virtual_xy_px", "virtual_cov_px2", "virtual_status")

@@ -9,9 +9,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from benchmarks.frame.published import read_measured
 from benchmarks.suites.ablation.comparison import Comparison
 from benchmarks.suites.ablation.rules import BY_NAME
-from benchmarks.support.published import MEASURED_FOLDER, read_measured, write_published
+from benchmarks.support.command import write_published
 
 NAME = "ablation"
 JUDGED = ("wrong", "lost", "rms_px", "typical_px", "departure", "beyond", "ms")
@@ -26,7 +27,7 @@ def comparison_row(found: Comparison) -> dict[str, Any]:
 
 def publish(rows: Iterable[Mapping[str, Any]], command: str, seed: int) -> list[Path]:
     """Put the rows beside those of the rules that were tried earlier. Returns the written files."""
-    earlier = read_measured(NAME)["rows"] if (MEASURED_FOLDER / f"{NAME}.json").exists() else []
+    earlier = read_measured(NAME).get("rows", [])
     own = [{**row, "command": command, "seed": seed} for row in rows]
     measured = {"rows": merged_rows(earlier, own)}
     return write_published(NAME, measured, documentation_blocks(measured))

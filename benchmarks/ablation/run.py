@@ -29,14 +29,14 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from benchmarks.ablation.report import comparison_row, publish
+from benchmarks.frame.conditions import commit_seed, conditions_text
 from benchmarks.suites.ablation.comparison import Change, Comparison, compare
 from benchmarks.suites.ablation.pictures import POOLED, PROVOKING, KeptPicture, keep_pictures
 from benchmarks.suites.ablation.rule import Kind, Rule
 from benchmarks.suites.ablation.rules import BY_NAME, RULES
 from benchmarks.suites.ablation.trial import PictureScore, read_without
-from benchmarks.suites.camera.cases import commit_seed
-from benchmarks.support.code_copy import CodeCopy
-from benchmarks.support.machine import conditions_text, write_json
+from benchmarks.suites.code_copy import CodeCopy
+from benchmarks.support.command import write_json
 from extractor.presets import PRESETS
 
 SUITES: dict[Kind, tuple[str, ...]] = {

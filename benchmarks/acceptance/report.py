@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from benchmarks.acceptance.points import MOST_LOST, MOST_WRONG, Point
-from benchmarks.support.published import read_measured
+from benchmarks.frame.published import read_measured
 
 NAME, IMAGE = "acceptance", "acceptance.png"
 BLUE, GREY = "#0072b2", "#444444"

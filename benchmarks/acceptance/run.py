@@ -22,15 +22,13 @@ from typing import NamedTuple
 
 from benchmarks.acceptance.points import Point, pooled_point
 from benchmarks.acceptance.report import NAME, curve_table, documentation_blocks
+from benchmarks.frame.conditions import commit_seed, conditions_text
 from benchmarks.suites.ablation.pictures import KeptPicture, keep_cases, keep_pictures, random_damage_cases
 from benchmarks.suites.ablation.trial import read_changed, score_reading
-from benchmarks.suites.camera.cases import commit_seed
+from benchmarks.suites.code_copy import ROOT, CodeCopy, Replacement
 from benchmarks.suites.stress.frames import PATTERNS
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
-from benchmarks.support.code_copy import ROOT, CodeCopy, Replacement
-from benchmarks.support.command import publishing_parser, wide_console
-from benchmarks.support.machine import conditions_text, write_json
-from benchmarks.support.published import write_published
+from benchmarks.support.command import publishing_parser, wide_console, write_json, write_published
 
 PICTURES, QUICK_PICTURES = 1050, 21
 OTHERS_A_DRAW = 4  # pictures of stress and of camera each, for one of damage of every kind and pattern

@@ -1,4 +1,4 @@
-"""Pictures that fail: files with overlays, and the part of docs/explanation/hard-cases.md that ``--page`` writes.
+"""The part of docs/explanation/hard-cases.md on the camera suite, with the pictures that fail.
 
 The page is made from docs/measured/camera.json alone: its pictures are made again from their seed, and the reader's
 results are stored in the file. The page can therefore be drawn again without reading.
@@ -8,35 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.camera.report import EffectRow, rows_table
+from benchmarks.frame.published import Page
+from benchmarks.frame.sheet import TILE_PX, Tile, draw_dots, draw_sheet
 from benchmarks.suites.camera.cases import COMBINED, KINDS, CameraCase, sample_chain
-from benchmarks.suites.camera.reading import (
-    LOST,
-    UNSEEN,
-    WRONG_ID,
-    WRONG_PLACE,
-    PictureResult,
-    cached_extractor,
-)
+from benchmarks.suites.camera.reading import LOST, UNSEEN, WRONG_ID, WRONG_PLACE, PictureResult
 from benchmarks.suites.camera.shoot import CameraPicture, shoot
 from benchmarks.suites.scoring.calibration import summarise
-from benchmarks.support.published import MEASURED_FOLDER, ROOT, read_measured, write_published
-from cmpdesign.files.atomic import write_file
-from extractor.presets import Preset
 
-NAME = "camera"
 IMAGE = "camera-failures.jpg"
 LEAST_MEASURED, MOST_RMS_PITCHES, MOST_Z = 0.95, 0.05, 5.0  # beyond these a picture fails
-TILE_PX, CAPTION_PX, COLUMNS, QUALITY = (208, 156), 46, 4, 72
-DOT_PX = 2  # radius
-LOST_BGR, WRONG_BGR, PAPER_BGR, TEXT_BGR = (0, 220, 255), (60, 60, 255), (255, 255, 255), (54, 47, 43)
+LOST_BGR, WRONG_BGR = (0, 220, 255), (60, 60, 255)
 
 
 def fails(result: PictureResult) -> bool:
@@ -90,27 +77,10 @@ def shown_record(result: PictureResult) -> dict[str, Any]:
     }
 
 
-def publish(
-    found: Mapping[str, Any], rows: Sequence[EffectRow], results: Sequence[PictureResult]
-) -> list[Path]:
-    """Write docs/measured/camera.json, the picture, and its part of the hard cases. Returns the written files."""
-    shown = [shown_record(result) for result in shown_results(results)]
-    kept = {name: value for name, value in found.items() if name != "graded"}
-    measured = {**kept, "shown": shown, "table": rows_table(rows)}
-    written = write_published(NAME, measured, documentation_blocks(measured))
-    image = ROOT / "docs" / "images" / IMAGE
-    write_file(image, failures_picture(measured))
-    return [*written, image]
-
-
-def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
-    """The part of docs/explanation/hard-cases.md from the content of docs/measured/camera.json."""
-    command = (
-        f"python -m benchmarks.camera --seed {measured['seed']} --pictures {measured['pictures']} "
-        f"--preset {measured['preset']} --page"
-    )
+def page(measured: Mapping[str, Any]) -> Page:
+    """The block and the sheet from the content of docs/measured/camera.json."""
     text = (
-        f"Written by `{command}`.\n\n"
+        f"Written by `{measured['command']} --publish`.\n\n"
         f"![Pictures of the camera suite that fail](../images/{IMAGE})\n\n"
         "A picture fails if a marker has another's id or an error above 0.3 of an edge, if fewer than 95 % of the "
         "visible markers are measured, if their RMS error is above a twentieth of the pitch, or if z is above 5. Of "
@@ -119,35 +89,15 @@ def documentation_blocks(measured: Mapping[str, Any]) -> dict[str, str]:
         "z. Yellow: lost. Red: wrong.\n\n"
         f"```text\n{measured['table']}\n```"
     )
-    return {NAME: text}
-
-
-def page_pictures() -> dict[str, bytes]:
-    """Name in docs/images -> JPEG, from docs/measured/camera.json; empty as long as there is no such file."""
-    if not (MEASURED_FOLDER / f"{NAME}.json").exists():
-        return {}
-    return {IMAGE: failures_picture(read_measured(NAME))}
-
-
-def failures_picture(measured: Mapping[str, Any]) -> bytes:
-    """JPEG of a sheet: the shown pictures with lost and wrong markers, and the reader's result."""
     tiles = [_tile(CameraCase(measured["seed"], entry["number"]), entry) for entry in measured["shown"]]
-    blank = np.full((TILE_PX[1] + CAPTION_PX, TILE_PX[0], 3), PAPER_BGR, dtype=np.uint8)
-    tiles += [blank] * (-len(tiles) % COLUMNS or (COLUMNS if not tiles else 0))
-    rows = [np.hstack(tiles[first : first + COLUMNS]) for first in range(0, len(tiles), COLUMNS)]
-    return bytes(cv2.imencode(".jpg", np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1])
+    return Page({"camera": text}, {IMAGE: draw_sheet(tiles, columns=4, lines=3, text_scale=0.38)})
 
 
-def _tile(case: CameraCase, entry: Mapping[str, Any]) -> NDArray[np.uint8]:
+def _tile(case: CameraCase, entry: Mapping[str, Any]) -> Tile:
     picture = shoot(sample_chain(case))
-    tile = np.full((TILE_PX[1] + CAPTION_PX, TILE_PX[0], 3), PAPER_BGR, dtype=np.uint8)
     nothing = entry["outcomes"].strip(UNSEEN + LOST) == ""
     marked = picture.image if nothing else marked_picture(picture, entry["outcomes"])
-    tile[: TILE_PX[1]] = _cropped(marked, picture)
-    for line, text in enumerate(_caption(entry)):
-        place = (3, TILE_PX[1] + 12 + 14 * line)
-        cv2.putText(tile, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.38, TEXT_BGR, 1, cv2.LINE_AA)
-    return tile
+    return Tile(_cropped(marked, picture), _caption(entry))
 
 
 def _caption(entry: Mapping[str, Any]) -> tuple[str, str, str]:
@@ -172,27 +122,8 @@ def _cropped(image: NDArray[np.uint8], picture: CameraPicture) -> NDArray[np.uin
 def marked_picture(picture: CameraPicture, outcomes: str) -> NDArray[np.uint8]:
     """The picture with a dot at the true position of every lost or wrong marker."""
     canvas = picture.image.copy()
-    for (x, y), letter in zip(picture.marker_xy_px, outcomes, strict=True):
+    for xy_px, letter in zip(picture.marker_xy_px, outcomes, strict=True):
         color = {LOST: LOST_BGR, WRONG_PLACE: WRONG_BGR, WRONG_ID: WRONG_BGR}.get(letter)
         if color is not None:
-            place = (round(16 * float(x)), round(16 * float(y)))
-            cv2.circle(canvas, place, 16 * DOT_PX, color, -1, cv2.LINE_AA, 4)
+            draw_dots(canvas, [xy_px], color)
     return canvas
-
-
-def save_pictures(results: Sequence[PictureResult], preset: Preset, folder: Path) -> None:
-    """Write the pictures of results, and overlays of the reader's results, into a folder."""
-    from extractor.draw import draw_markers
-
-    folder.mkdir(parents=True, exist_ok=True)
-    for result in results:
-        chain = sample_chain(result.case)
-        picture = shoot(chain)
-        stem = result.case.name.replace("/", "-").replace(" ", "_")
-        cv2.imwrite(str(folder / f"{stem}.png"), picture.image)
-        if result.raised:
-            continue
-        extractor = cached_extractor(chain.pose.pattern, chain.pose.layers, preset)
-        markers = extractor.extract(picture.image)
-        overlay = draw_markers(marked_picture(picture, result.outcomes), extractor.layout, markers)
-        cv2.imwrite(str(folder / f"{stem}.overlay.png"), overlay)

@@ -1,7 +1,5 @@
 """Speed against error: the presets, other detectors of corners, and the article's method, on the same scenes.
 
-    python -m benchmarks.comparison [--quick] [--response srgb|linear] [--json FILE] [--publish]
-
 640 x 480 px, edges of 20 px, rotated by 7.3 degrees, blur 1 px in light, sRGB, noise 2/255 after it: honeycomb with 397
 markers flat, tilted by 35 degrees, bulged, twisted, blurred by 1.6 px, with edges of 13 px; round and elliptical
 patterns flat. Detectors of checkerboards read a board of 400 inner corners with the same edge length, camera, surface
@@ -18,68 +16,39 @@ covariance C: 1 is right. ``--response linear`` measures the same scenes on line
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import asdict, replace
+from typing import Literal
 
-# before numpy and chess-corners: times are of one core
-os.environ["OMP_NUM_THREADS"] = os.environ["RAYON_NUM_THREADS"] = "1"
-
-import cv2
-
+from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.suites.comparison.measure import CASES, MethodResult, measure_case
 from benchmarks.suites.comparison.pooled import measure_pooled, pooled_cases
-from benchmarks.suites.comparison.report import (
-    comparison_markdown,
-    pooled_markdown,
-    pooled_table,
-    scene_table,
-)
-from benchmarks.support.command import publishing_parser, wide_console
-from benchmarks.support.machine import conditions_text, write_json
-from benchmarks.support.published import write_published
+from benchmarks.suites.comparison.report import page, pooled_table, scene_table
 
 REPETITIONS, QUICK_REPETITIONS = 11, 3
 POOLED_SEEDS, QUICK_POOLED_SEEDS = 4, 1
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Measure, print one table per scene; write the JSON file or the documentation on request."""
-    parser = publishing_parser("comparison", __doc__, "repetitions")
-    parser.add_argument("--response", choices=("srgb", "linear"), default="srgb", help="of all pictures")
-    options = parser.parse_args(arguments)
-    if options.publish and options.response != "srgb":
-        parser.error("--publish writes the figures of sRGB pictures; leave --response out")
-    cv2.setNumThreads(1)
-    repetitions = QUICK_REPETITIONS if options.quick else REPETITIONS
-    console = wide_console(150)
-    results: list[MethodResult] = []
-    caption = f"{options.response} pictures, {repetitions} repetitions; the article's time is an upper bound"
-    for case in CASES:
-        results += measure_case(replace(case, response=options.response), repetitions)
-        console.print(scene_table(case.name, results, caption))
-    seeds = QUICK_POOLED_SEEDS if options.quick else POOLED_SEEDS
-    pooled = measure_pooled(pooled_cases(options.response), seeds)
-    console.print(pooled_table(pooled, f"{options.response} pictures, {seeds} noises a scene"))
-    console.print(conditions_text(), style="dim", soft_wrap=True)
-    found = {
-        "response": options.response,
-        "repetitions": repetitions,
-        "results": [asdict(result) for result in results],
-        "pooled": [asdict(result) for result in pooled],
-    }
-    if options.json:
-        write_json(options.json, found)
-    if options.publish:
-        blocks = {
-            "comparison": comparison_markdown(results),
-            "comparison-pooled": pooled_markdown(pooled),
-            "conditions": conditions_text(),
-        }
-        for path in write_published("comparison", found, blocks):
-            console.print(f"wrote {path}")
-    return 0
+def measure(quick: bool = False, response: Literal["srgb", "linear"] = "srgb") -> Shown:
+    """One table per scene, and one of all scenes together.
 
+    Args:
+        quick: few repetitions.
+        response: of all pictures.
+    """
+    repetitions = QUICK_REPETITIONS if quick else REPETITIONS
+    results: list[MethodResult] = []
+    caption = f"{response} pictures, {repetitions} repetitions; the article's time is an upper bound"
+    for case in CASES:
+        results += measure_case(replace(case, response=response), repetitions)
+        yield scene_table(case.name, results, caption)
+    seeds = QUICK_POOLED_SEEDS if quick else POOLED_SEEDS
+    pooled = measure_pooled(pooled_cases(response), seeds)
+    yield pooled_table(pooled, f"{response} pictures, {seeds} noises a scene")
+    record = {"results": [asdict(one) for one in results], "pooled": [asdict(one) for one in pooled]}
+    return Found({"response": response, "repetitions": repetitions, **record})
+
+
+main = Experiment("comparison", measure, page)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

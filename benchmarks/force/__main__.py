@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.table import Table
 
 from benchmarks.force.seen import seen_from
 from benchmarks.force.truth import FRICTION, TRUTH, YOUNG_MPA, Case, cases
-from benchmarks.support.command import wide_console
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import TEXT, Table
 from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.finite_block import make_gel
@@ -25,6 +23,10 @@ from extractor import ContactForce, ContactReader
 Array = NDArray[np.float64]
 DEPTH_PLACE, DEPTH_MM = 0, 0.5  # of ``DEPTHS_MM``
 LEAST_N = 0.3  # of the summary's frames
+COLUMNS = {
+    "contact": TEXT, "Fz, N": ".3f", "error": "+.1%", "z": "+.1f", "shear": ".1%", "torque": ".1%", "torque z": ".1f",
+    "centre, um": ".0f", "radius": "+.0%", "utilisation": "+.3f", "regions": "d", "cold ms": ".1f", "warm ms": ".1f",
+}  # fmt: skip
 FLAT = ("twist", "punch", "ring")  # their touched area is not that of a ball
 
 
@@ -98,43 +100,6 @@ def read_case(
         yield errors_of(found, frame, case.name, times_ms)
 
 
-def main() -> int:
-    """Print one row for every frame, markers 0.5 mm deep, and the summary of the frames above 0.3 N."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--truth", type=Path, default=TRUTH, help="file of `python -m benchmarks.force.truth`"
-    )
-    parser.add_argument("--one-view", type=float, metavar="MM", help="distance of a single camera")
-    parser.add_argument("--only", nargs="*", default=[case.name for case in cases()])
-    parser.add_argument("--seed", type=int, default=1)
-    args = parser.parse_args()
-    with np.load(args.truth) as file:
-        truth = dict(file)
-    random = np.random.default_rng(args.seed)
-    found: list[Errors] = []
-    for case in cases():
-        mine = np.flatnonzero(truth["case"] == case.name)
-        if len(mine) and case.name in args.only:
-            frames = [{key: values[k] for key, values in truth.items()} for k in mine]
-            found += read_case(case, frames, random, args.one_view)
-    table = Table(
-        "contact", "Fz, N", "error", "z", "shear", "torque", "torque z", "centre, um", "radius", "utilisation",
-        "regions", "cold ms", "warm ms",
-    )  # fmt: skip
-    for one in found:
-        table.add_row(
-            one.name, f"{one.press_n:.3f}", f"{one.normal:+.1%}", f"{one.normal_z:+.1f}", f"{one.shear:.1%}",
-            f"{one.torque:.1%}", f"{np.sqrt((one.torque_z**2).mean()):.1f}", f"{1e3 * one.centre_mm:.0f}",
-            f"{one.radius:+.0%}", f"{one.utilisation:+.3f}", str(one.regions),
-            f"{one.cold_ms:.1f}", f"{one.warm_ms:.1f}",
-        )  # fmt: skip
-    console = wide_console(150)
-    console.print(table)
-    for line in summary_lines([one for one in found if one.press_n > LEAST_N]):
-        console.print(line)
-    return 0
-
-
 def summary_lines(found: list[Errors]) -> Iterator[str]:
     """Root mean square and worst of every error, and z."""
     yield f"{len(found)} frames above {LEAST_N} N"
@@ -147,6 +112,36 @@ def summary_lines(found: list[Errors]) -> Iterator[str]:
             text += f", z {np.sqrt((z**2).mean()):.2f}"
         yield f"{name}: {text}"
 
+
+def measure(one_view: float | None = None, only: tuple[str, ...] = (), seed: int = 1) -> Shown:
+    """One row for every frame, markers 0.5 mm deep, and the summary of the frames above 0.3 N.
+
+    Args:
+        one_view: distance of a single camera, mm; two views without it.
+        only: names of contacts; all by default.
+    """
+    with np.load(TRUTH) as file:
+        truth = dict(file)
+    random = np.random.default_rng(seed)
+    found: list[Errors] = []
+    for case in cases():
+        mine = np.flatnonzero(truth["case"] == case.name)
+        if len(mine) and (not only or case.name in only):
+            frames = [{key: values[k] for key, values in truth.items()} for k in mine]
+            found += read_case(case, frames, random, one_view)
+    rows = [
+        (
+            one.name, one.press_n, one.normal, one.normal_z, one.shear, one.torque,
+            np.sqrt((one.torque_z**2).mean()), 1e3 * one.centre_mm, one.radius, one.utilisation, one.regions,
+            one.cold_ms, one.warm_ms,
+        )
+        for one in found
+    ]  # fmt: skip
+    yield Table("frames", COLUMNS, rows)
+    yield from summary_lines([one for one in found if one.press_n > LEAST_N])
+
+
+main = Experiment("force", measure)
 
 if __name__ == "__main__":
     raise SystemExit(main())

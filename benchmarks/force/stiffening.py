@@ -1,4 +1,4 @@
-"""``python -m benchmarks.force.stiffening``: how much more force a large strain needs than the reader's linear theory.
+"""How much more force a large strain needs than the reader's linear theory.
 
 A ball without friction presses a neo-Hookean layer, in round finite elements. The markers of a pad move as the layer
 does, and as the same layer moves under the same tractions by linear theory. The reader reads both; the ratio of its
@@ -7,20 +7,19 @@ forces is the factor by which its normal force falls short, and all other errors
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from rich.table import Table
 from scipy.sparse import bmat
 
 from benchmarks.force.seen import Seen, seen_from
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import Table
 from benchmarks.large_strain import neo_hookean
 from benchmarks.large_strain.neo_hookean import PRESS_STEP_MM, NeoHookeanLayer
-from benchmarks.support.command import wide_console
 from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.finite_block import make_gel
@@ -98,18 +97,16 @@ def on_markers(xy_mm: Array, far_mm: Array, moved_mm: Array) -> Array:
     return np.column_stack([offset / np.maximum(away, 1e-9)[:, None] * outward[:, None], up])
 
 
-def main() -> int:
-    """Print one row for every state and depth of markers."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--one-view", type=float, metavar="MM", help="distance of a single camera")
-    parser.add_argument("--seed", type=int, default=1)
-    args = parser.parse_args()
-    random, far_mm = np.random.default_rng(args.seed), np.linspace(0.0, 16.0, 129)
+def measure(one_view: float | None = None, seed: int = 1) -> Shown:
+    """One row for every state and depth of markers.
+
+    Args:
+        one_view: distance of a single camera, mm; two views without it.
+    """
+    random, far_mm = np.random.default_rng(seed), np.linspace(0.0, 16.0, 129)
     layout = build_layout(load_design("honeycomb", {"layers": "6", "pitch_mm": "1.5"}))
-    table = Table(
-        "thickness", "ball", "press", "depth", "force, N", "read F / (A E)", "radius / thickness", "factor"
-    )
     readers: dict[tuple[float, float], Seen] = {}
+    rows = []
     for thickness, radius, steps in PRESSES:
         layer = NeoHookeanLayer(Elastomer(thickness, YOUNG_MPA, 0.5, 0.5), radius, NEAR_MM)
         for state in pressed_states(layer, steps, far_mm):
@@ -117,20 +114,21 @@ def main() -> int:
                 if (thickness, depth) not in readers:
                     gel = make_gel(layout, Elastomer(thickness, 1.0, 0.5, depth), margin_mm=MARGIN_MM)
                     linear = ContactReader(layout, gel, YOUNG_MPA, model=ForceModel(strain_factor=0.0))
-                    readers[thickness, depth] = seen_from(linear, args.one_view)
+                    readers[thickness, depth] = seen_from(linear, one_view)
                 seen, read = readers[thickness, depth], []
                 for moved in (state.finite_mm[depth], state.linear_mm[depth]):
                     seen.reader.reset()
                     read.append(seen.read(on_markers(layout.marker_xy_mm, far_mm, moved), random))
                 area = read[0].regions[0].area_mm2
-                table.add_row(
-                    f"{thickness:g}", f"{radius:g}", f"{state.press_mm:.1f}", f"{depth:g}", f"{state.force_n:.3f}",
-                    f"{-read[0].force_n[2] / (area * YOUNG_MPA):.3f}", f"{np.sqrt(area / np.pi) / thickness:.2f}",
-                    f"{read[1].force_n[2] / read[0].force_n[2]:.4f}",
-                )  # fmt: skip
-    wide_console(150).print(table)
-    return 0
+                ratios = -read[0].force_n[2] / (area * YOUNG_MPA), np.sqrt(area / np.pi) / thickness
+                factor = read[1].force_n[2] / read[0].force_n[2]
+                rows.append((thickness, radius, state.press_mm, depth, state.force_n, *ratios, factor))
+    columns = {"thickness": "g", "ball": "g", "press": ".1f", "depth": "g", "force, N": ".3f"}
+    columns |= {"read F / (A E)": ".3f", "radius / thickness": ".2f", "factor": ".4f"}
+    yield Table("stiffening", columns, rows)
 
+
+main = Experiment("force.stiffening", measure)
 
 if __name__ == "__main__":
     raise SystemExit(main())

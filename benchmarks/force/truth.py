@@ -1,4 +1,4 @@
-"""``python -m benchmarks.force.truth``: the finite-element frames that the force benchmark reads, as one file.
+"""The finite-element frames that the force benchmark reads, as one file.
 
 The frames take hours of one core; with ``pypardiso`` from PyPI, which is no dependency of the project, a minute or two
 each. ``truth.npz`` beside this module holds 16 of them: the drag, the turns of the twist, the punch, two balls, most of
@@ -7,7 +7,6 @@ the rim and nu .49 are not solved yet.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.force.neo_hookean_block import NeoHookeanBlock, Pose
 from benchmarks.force.objects import RigidObject
+from benchmarks.frame.experiment import Experiment, Shown
 from cmpdesign import build_layout
 from cmpdesign.design.design import load_design
 
@@ -123,31 +123,27 @@ def solve_case(case: Case, outline_mm: Array, markers_mm: Array) -> Iterator[dic
         }
 
 
-def main() -> int:
-    """Solve the contacts and write the file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=TRUTH)
-    parser.add_argument("--only", nargs="*", default=[case.name for case in cases()])
-    args = parser.parse_args()
+def measure(only: tuple[str, ...] = (), out: Path = TRUTH) -> Shown:
+    """Solve the contacts and write the file.
+
+    Args:
+        only: names of contacts; all by default.
+        out: the file.
+    """
     layout = build_layout(load_design("honeycomb"))
     rows, names = [], []
     for case in cases():
-        if case.name not in args.only:
+        if only and case.name not in only:
             continue
         for frame in solve_case(case, layout.outline_mm, layout.marker_xy_mm):
-            print(
-                case.name,
-                frame["pose"].round(2),
-                frame["force_n"].round(3),
-                frame["torque_nmm"].round(2),
-                flush=True,
-            )
+            yield f"{case.name} {frame['pose'].round(2)} {frame['force_n'].round(3)} {frame['torque_nmm'].round(2)}"
             rows.append(frame)
             names.append(case.name)
             columns = {key: np.stack([row[key] for row in rows]) for key in frame}
-            np.savez_compressed(args.out, case=np.array(names), **columns)
-    return 0
+            np.savez_compressed(out, case=np.array(names), **columns)
 
+
+main = Experiment("force.truth", measure)
 
 if __name__ == "__main__":
     raise SystemExit(main())

@@ -14,6 +14,7 @@ from extractor import Extractor, Markers
 PITCH_PX = 20.0
 SIZE = (460, 460)
 WRONG_PX = 10.0  # half a pitch
+VIEWS = ((64, 1.0), (64, 0.5), (4, 1 / 3))  # pads of a family, and the share of a pad in the picture
 
 
 @cache

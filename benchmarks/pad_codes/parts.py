@@ -1,11 +1,7 @@
-"""Parts of coded pads that are cropped and damaged, registered by their cells and bits: right and wrong motions.
-
-python -m benchmarks.pad_codes [--layers 10] [--parts 100000] [--seed 5]
-"""
+"""Parts of coded pads that are cropped and damaged, registered by their cells and bits: right and wrong motions."""
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -191,18 +187,3 @@ def measured(layers: int, parts: int, seed: int) -> dict[str, Counter[str]]:
     for group, verdict in islice(every, parts):
         counts.setdefault(group, Counter())[verdict] += 1
     return counts
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--layers", type=int, default=10)
-    parser.add_argument("--parts", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=5)
-    options = parser.parse_args()
-    counts = measured(options.layers, options.parts, options.seed)
-    print(f"{options.layers} layers, {options.parts} parts, seed {options.seed}")
-    for group in sorted(counts):
-        found = counts[group]
-        print(
-            f"{group:35} {found.total():8} right {found['right'] / found.total():7.2%}  wrong {found['wrong']}"
-        )

@@ -1,7 +1,5 @@
 """The studio's page: time to its first answer, from a changed field to the drawing, bytes of its own files.
 
-    python -m benchmarks.studio
-
 The times are those of requests to a running ``cmpdesign studio`` on this machine.
 """
 
@@ -18,13 +16,15 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
+from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.table import TEXT, Table
 from cmpdesign.studio.app import PAGE
 
 LAYERS, CHANGES = 20, 200
 
 
-def main() -> int:
-    """Print the figures."""
+def measure() -> Shown:
+    """One row a figure."""
     began_s = time.perf_counter()
     command = [sys.executable, "-m", "cmpdesign", "studio", "--port", "0", "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -51,14 +51,18 @@ def main() -> int:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     size = sum(len(gzip.compress(path.read_bytes())) for path in PAGE.iterdir())
     p50, p95 = np.percentile(times_ms, [50, 95])
-    print(f"start to first answer: {first_s:.2f} s")
-    print(
-        f"changed field to drawing, {LAYERS} layers, {CHANGES} changes: median {p50:.0f} ms, 95 % {p95:.0f} ms"
-    )
-    print(f"processor time of the server for all of this: {used.ru_utime + used.ru_stime:.1f} s")
-    print(f"the page's own files, compressed: {size / 1e3:.0f} kB")
-    return 0
+    changes = f"changed field to drawing, {LAYERS} layers, {CHANGES} changes, ms"
+    rows = [
+        ("start to first answer, s", first_s),
+        (f"{changes}: median", p50),
+        (f"{changes}: 95 %", p95),
+        ("processor time of the server for all of this, s", used.ru_utime + used.ru_stime),
+        ("the page's own files, compressed, kB", size / 1e3),
+    ]
+    yield Table("studio", {"figure": TEXT, "value": ".2f"}, rows)
 
+
+main = Experiment("studio", measure)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
+
+from benchmarks.frame.conditions import machine_conditions
+from benchmarks.frame.published import Page, json_text, publish
+from cmpdesign.files.atomic import write_file
 
 
 def publishing_parser(
@@ -34,3 +40,13 @@ def wide_console(width: int) -> Console:
     """The terminal, or this number of columns without a terminal: a pipe has no width, and tables would be cut."""
     terminal = Console()
     return terminal if terminal.is_terminal else Console(width=width)
+
+
+def write_json(path: Path, results: Mapping[str, Any]) -> None:
+    """Write conditions and results to a file."""
+    write_file(path, json_text({"conditions": machine_conditions(), **results}))
+
+
+def write_published(name: str, results: Mapping[str, Any], blocks: Mapping[str, str]) -> list[Path]:
+    """Write docs/measured/NAME.json and the blocks of all pages. Returns the written files."""
+    return publish(name, {"conditions": machine_conditions(), **results}, Page(blocks))

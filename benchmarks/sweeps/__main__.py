@@ -1,8 +1,66 @@
-"""``python -m benchmarks.sweeps``: see ``run``."""
+"""Sweeps: one condition changes step by step; steps that are refused between two that are read, and wrong ids.
+
+Eight sets of inks, three seeds of noise each; 40 lamps (black bodies of 2,000 to 15,000 K, then triples of a red, a
+green and a blue LED round the circle of hues) by spectra, with color matrix and white balance of daylight; black
+raised from 0 to 90 of 255; exposure from 0.3 to 3. A reader that depends on light smoothly reads one stretch of a line.
+"read" are pictures with markers and no reason.
+"""
 
 from __future__ import annotations
 
-from benchmarks.sweeps.run import main
+from collections import Counter
+from collections.abc import Sequence
+
+from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.parallel import PROCESSES, results_of
+from benchmarks.frame.table import TEXT, Table
+from benchmarks.suites.sweeps.lines import BLACKS, EXPOSURES, LAMPS, SEEDS, LineResult, make_lines, read_line
+
+COLUMNS = {
+    "line": TEXT,
+    "steps": "d",
+    "read": "d",
+    "between": "d",
+    "one in": ".0f",
+    "ids": "d",
+    "reasons": TEXT,
+}
+
+
+def kind_row(name: str, results: Sequence[LineResult]) -> tuple[object, ...]:
+    """The lines of a kind: steps, read ones, refused ones between two read ones, wrong ids."""
+    reasons = Counter(reason for result in results for reason in result.reasons)
+    read, steps = reasons.pop("", 0), sum(len(result.reasons) for result in results)
+    between = sum(result.between for result in results)
+    refused = ", ".join(f"{reason} {count}" for reason, count in sorted(reasons.items()))
+    wrong = sum(result.wrong_ids for result in results)
+    return name, steps, read, between, steps / between if between else None, wrong, refused
+
+
+def broken_line(result: LineResult) -> str:
+    """A line with refused steps between read ones; ``.`` read, ``x`` refused."""
+    steps = "".join("x" if reason else "." for reason in result.reasons)
+    line = result.line
+    return f"{line.kind}, inks {line.inks}, seed {line.seed}: {steps}"
+
+
+def measure(quick: bool = False, processes: int = PROCESSES) -> Shown:
+    """A row for each kind of line and the broken lines; fails if an id is wrong.
+
+    Args:
+        quick: lines of one seed.
+    """
+    results = results_of(read_line, make_lines(1 if quick else SEEDS), processes, chunk=1)
+    rows = [
+        kind_row(kind, [result for result in results if result.line.kind == kind])
+        for kind in (LAMPS, BLACKS, EXPOSURES)
+    ]
+    yield Table("sweeps", COLUMNS, [*rows, kind_row("together", results)])
+    yield from (broken_line(result) for result in results if result.between)
+    return Found(failed=any(result.wrong_ids for result in results))
+
+
+main = Experiment("sweeps", measure)
 
 if __name__ == "__main__":
     raise SystemExit(main())

@@ -34,10 +34,13 @@ class RepairLimits(NamedTuple):
     """Limits of repaired markers. Distances and deviations are in edges, unless stated otherwise.
 
     The variance of a repaired marker has two parts. The stated errors of its neighbours are independent: each counts by
-    the squared weight of the neighbour. The rest of the neighbours' residual variance is a departure of the surface
-    from the map: its deviation counts ``mild_error`` * leverage times, as the surface departs the more from the map the
-    farther this extrapolates. The factor is from 300 rendered scenes with missing cells and dirt on flat, tilted,
-    pressed and twisted patterns. The variance of a fitted marker has the same two parts (``layer_arcs``).
+    the squared weight of the neighbour. The other part is the departure of the surface from the map, the larger of two
+    estimates. By the neighbours' residuals: their deviation beyond noise counts ``mild_error`` * leverage times, as a
+    smooth surface departs the more from the map the farther this extrapolates. By cross-validation: the neighbours are
+    predicted from their own rings, too, and the variance of their departures beyond noise, over 1 + leverage, is that
+    of markers that scatter. Measurements that were dropped as inconsistent count among these departures: where a whole
+    row of them contradicts the map, as under a rolling shutter, the map may be what is wrong. The variance of a fitted
+    marker has two parts, too (``layer_arcs``).
 
     Attributes:
         mild_support: known neighbours of two rings that make an omission mild. Chosen.
@@ -48,8 +51,12 @@ class RepairLimits(NamedTuple):
         model_deviation: deviation of a smooth surface from a quadratic map. Chosen.
         fitted_model_sigmas: such deviations that are added to a layer's residual before it is compared with
             ``max_fitted_deviation``. Chosen.
-        mild_error: times leverage, of the departure. Measured as described above, by no command that is kept;
-            `python -m benchmarks.calibration` prints z of repaired markers.
+        mild_error: times leverage, of the departure by residuals. Measured: `python -m benchmarks.calibration` prints z
+            of repaired markers.
+        picture_departures: departures, as many as those of the whole picture count beside those around a marker.
+            Chosen.
+        own_departures: as many as that of a marker's own dropped measurement counts. Chosen: with 1, a third of the
+            markers that a wobble of 3 to 6 px moves were repaired with too small a deviation.
         layers: limits of a layer's quadratic.
         maps: limits of the predictions by neighbours.
         consistency: limits of markers that do not contradict their neighbours.
@@ -62,7 +69,9 @@ class RepairLimits(NamedTuple):
     max_leverage: float = 1.2
     model_deviation: float = 0.012
     fitted_model_sigmas: float = 3.0
-    mild_error: float = 1.6
+    mild_error: float = 1.2
+    picture_departures: float = 4.0
+    own_departures: float = 4.0
     layers: LayerLimits = LAYER_LIMITS
     maps: NeighbourMapLimits = NEIGHBOUR_MAP_LIMITS
     consistency: ConsistencyLimits = CONSISTENCY_LIMITS

@@ -36,6 +36,8 @@ class RowBreakLimits(NamedTuple):
         most_of_layout: a third of the layout's own third difference, for a gridline to count. Chosen: a tilted view
             maps it a tenth wrong.
         min_rise: of a gridline across the rows, to count. Chosen.
+        max_deviation: of the four markers of a gridline, to count: dirt moves uncertain markers as far as a tear does.
+            Chosen.
         min_jump: of a strip, for a break. Chosen: 0.4 px where an edge has 20.
         ratio: of the largest jump along rows and that along columns. Chosen: pressed and twisted patterns have less
             than 2.
@@ -55,6 +57,7 @@ class RowBreakLimits(NamedTuple):
     min_gridlines: int = 5
     most_of_layout: float = 0.06
     min_rise: float = 0.6
+    max_deviation: float = 0.035
     min_jump: float = 0.02
     ratio: float = 3.0
     spread: float = 2.0

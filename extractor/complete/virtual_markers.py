@@ -18,6 +18,7 @@ from extractor.layout.topology import Topology
 from extractor.refine.measure.marker_scatter import MarkerScatter
 from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
 from extractor.refine.synthesis.gridlines import GridlineLimits
+from extractor.result import VirtualMarkers
 
 
 class VirtualLimits(NamedTuple):
@@ -35,19 +36,6 @@ class VirtualLimits(NamedTuple):
 
 
 LIMITS = VirtualLimits()
-
-
-class VirtualMarkers(NamedTuple):
-    """m virtual markers on each of E edges.
-
-    Attributes:
-        xy_px, cov_px2: (E, m, 2) and (E, m, 2, 2) float64, NaN where lost.
-        status: (E, m) uint8, a ``VirtualStatus`` each.
-    """
-
-    xy_px: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
-    status: NDArray[np.uint8]
 
 
 def locate_virtual_markers(

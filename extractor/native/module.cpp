@@ -37,6 +37,10 @@ void add_solve(nb::module_ module);
 void add_markers(nb::module_ module);
 }  // namespace cmp::refine
 
+namespace cmp::space {
+void add_space(nb::module_ module);
+}  // namespace cmp::space
+
 namespace cmp::track {
 void add_track(nb::module_ module);
 }  // namespace cmp::track
@@ -55,5 +59,6 @@ NB_MODULE(_native, module) {
   cmp::refine::add_solve(module.def_submodule("solve"));
   cmp::refine::add_markers(module.def_submodule("markers"));
   cmp::complete::add_complete(module.def_submodule("complete"));
+  cmp::space::add_space(module.def_submodule("space"));
   cmp::track::add_track(module.def_submodule("track"));
 }

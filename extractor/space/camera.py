@@ -16,18 +16,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import space as native
 from extractor.errors import RigError
-from extractor.space.lens import COUNTS, Lens, LensKind
+from extractor.space.lens import COUNTS, Lens, LensKind, LensTable
 from extractor.space.medium import (
+    NO_WINDOW,
     Lines,
     Medium,
     PlacedWindow,
     WindowPlane,
-    cross_matrix,
     gel_depth_mm,
     place_window,
-    refract_points,
-    refract_rays,
 )
 
 Array = NDArray[np.float64]
@@ -51,6 +50,17 @@ class Linearisation(NamedTuple):
     directions: Array
     by_point: Array
     by_pose: Array
+
+
+class PlacedViewTable(NamedTuple):
+    """A placed view for native loops."""
+
+    focal_px: tuple[float, float]
+    centre_px: tuple[float, float]
+    lens: LensTable
+    rotation: Array
+    shift_mm: Array
+    window: PlacedWindow
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +187,14 @@ class View:
         return place_window(self.medium, self.window, self.R_camera_from_layout, self.t_camera_from_layout_mm)
 
     @cached_property
+    def native(self) -> PlacedViewTable:
+        """What native loops read of this placed view."""
+        window = NO_WINDOW if self._placed_window is None else self._placed_window
+        rotation = np.ascontiguousarray(self.R_camera_from_layout)
+        shift_mm = self.t_camera_from_layout_mm
+        return PlacedViewTable(self.focal_px, self.centre_px, self._lens.native, rotation, shift_mm, window)
+
+    @cached_property
     def _lens(self) -> Lens:
         return Lens(self.lens, self.distortion)
 
@@ -209,26 +227,7 @@ class View:
 
     def linearised(self, xyz_mm: Array) -> Linearisation:
         """The projections of points (N, 3) mm in the layout frame, and their derivatives by point and pose."""
-        rotated = xyz_mm @ self.R_camera_from_layout.T
-        window, seen = self._placed_window, None
-        camera = rotated + self.t_camera_from_layout_mm
-        if window is not None:
-            seen = refract_points(window, rotated, self.t_camera_from_layout_mm)
-            camera = seen.xyz
-        depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
-        normalised = camera[:, :2] / depth[:, None]
-        normalised[np.hypot(*normalised.T) >= self.fold_radius] = np.nan
-        distorted = self._lens.distort(normalised)
-        by_camera = np.zeros((len(normalised), 2, 3))
-        by_camera[:, 0, 0] = by_camera[:, 1, 1] = 1 / depth
-        by_camera[:, :, 2] = -normalised / depth[:, None]
-        by_camera = np.array(self.focal_px)[:, None] * (distorted.by_direction @ by_camera)
-        xy_px = distorted.xy * self.focal_px + self.centre_px
-        if seen is not None:
-            by_point = by_camera @ seen.by_point @ self.R_camera_from_layout
-            return Linearisation(xy_px, normalised, by_point, by_camera @ seen.by_pose)
-        by_pose = np.concatenate([by_camera @ -cross_matrix(rotated), by_camera], axis=2)
-        return Linearisation(xy_px, normalised, by_camera @ self.R_camera_from_layout, by_pose)
+        return Linearisation(*native.linearise(self.native, np.ascontiguousarray(xyz_mm, np.float64)))
 
     def normalised(self, xy_px: Array) -> Array:
         """(N, 2) undistorted X / Z, Y / Z of pixels (N, 2); NaN where the distortion has no inverse."""
@@ -239,15 +238,7 @@ class View:
 
         In air all lines start at the camera, behind a window at its inner face; NaN as in ``normalised``.
         """
-        normalised = self.normalised(xy_px)
-        direction = np.column_stack([normalised, np.ones(len(normalised))])
-        if self._placed_window is not None:
-            lines = refract_rays(self._placed_window, direction)
-            origin_mm = (lines.origin_mm - self.t_camera_from_layout_mm) @ self.R_camera_from_layout
-            return Lines(origin_mm, lines.direction @ self.R_camera_from_layout)
-        direction = direction @ self.R_camera_from_layout
-        unit = np.asarray(direction / np.linalg.norm(direction, axis=1, keepdims=True))
-        return Lines(np.tile(self.position_mm, (len(unit), 1)), unit)
+        return Lines(*native.rays(self.native, np.ascontiguousarray(xy_px, np.float64)))
 
     def is_ahead(self, xyz_mm: Array) -> NDArray[np.bool_]:
         """(N,) bool, which points (N, 3) mm of the layout frame lie before the camera, behind its window if any."""

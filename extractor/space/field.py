@@ -9,7 +9,7 @@ of markers. All fields are functions of the position in the layout (mm); a squar
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,24 @@ MIN_QUADRATIC_NEIGHBOURS = 5  # for that of 5 terms; fewer get the plane
 MAX_CONDITION = 1e3  # of the normal equations; complete rings have 4 to 170. Chosen above these
 CANDIDATES = 12  # nearest triangles (by centroid) that are searched for a point; chosen
 MIN_BARYCENTRIC = -1e-9  # of a point in a triangle; derived: rounding
+
+
+class _Places(NamedTuple):
+    """Points of the layout, and those within the pattern.
+
+    Attributes:
+        xy_mm: (N, 2) the points.
+        hit: (H,) the points in a triangle.
+        corners: (H, 3) its markers.
+        inside: (H, 3) barycentric coordinates.
+        weights: (H, 9) of value, slope by x and slope by y of each corner.
+    """
+
+    xy_mm: Array
+    hit: NDArray[np.intp]
+    corners: NDArray[np.int32]
+    inside: Array
+    weights: Array
 
 
 class Field:
@@ -46,6 +64,7 @@ class Field:
         self._last_stencil: tuple[bytes, Array] | None = (
             None  # weights of the last known markers, with this key
         )
+        self._last_places: _Places | None = None
         self._ring_markers = _two_rings(np.asarray(layout.edges), len(self.xy_mm))
         self._edge_mm = float(np.linalg.norm(np.diff(self.xy_mm[layout.edges], axis=1)[:, 0], axis=1).mean())
 
@@ -115,9 +134,7 @@ class Field:
 
     def normals(self, xyz_mm: Array) -> Array:
         """(M, 3) unit normals, out of the front, of the surface through markers (M, 3); NaN where unknown."""
-        by_x, by_y = np.moveaxis(self.gradients(xyz_mm), 2, 0)
-        normal = np.cross(by_x, by_y)
-        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+        return normals_of(self.gradients(xyz_mm))
 
     def find(self, xy_mm: Array) -> tuple[NDArray[np.intp], Array]:
         """(N,) the triangle that contains each point (N, 2) of the layout, -1 for none; (N, 3) barycentric."""
@@ -147,17 +164,37 @@ class Field:
             xy_mm: (N, 2) points.
             smooth: with a continuous tangent plane; False: linear in each triangle.
         """
-        triangle, inside = self.find(xy_mm)
-        out = np.full((len(xy_mm), values.shape[1]), np.nan)
-        hit = np.flatnonzero(triangle >= 0)
-        corners = self.triangles[triangle[hit]]
+        places = self._places_of(xy_mm)
+        nearby = values[places.corners]
         if smooth:
-            out[hit] = clough_tocher(
-                self.xy_mm[corners], values[corners], self.gradients(values)[corners], inside[hit]
-            )
+            slopes = self.gradients(values)[places.corners]
+            terms = np.concatenate([nearby[:, :, None], np.moveaxis(slopes, 3, 2)], axis=2)
+            found = places.weights[:, None] @ terms.reshape(len(terms), 9, values.shape[1])
         else:
-            out[hit] = np.einsum("ni,nik->nk", inside[hit], values[corners])
+            found = places.inside[:, None] @ nearby
+        out = np.full((len(xy_mm), values.shape[1]), np.nan)
+        out[places.hit] = found[:, 0]
         return out
+
+    def _places_of(self, xy_mm: Array) -> _Places:
+        """The places of points; the last ones are kept, because grids stay the same from frame to frame."""
+        if self._last_places is None or not np.array_equal(self._last_places.xy_mm, xy_mm):
+            triangle, inside = self.find(xy_mm)
+            hit = np.flatnonzero(triangle >= 0)
+            corners, inside = self.triangles[triangle[hit]], inside[hit]
+            # the field is linear in the corners' values and slopes
+            units = np.tile(np.eye(9).reshape(3, 3, 9), (len(hit), 1, 1, 1))
+            values, slopes = units[:, :, 0], np.moveaxis(units[:, :, 1:], 2, 3)
+            weights = clough_tocher(self.xy_mm[corners], values, slopes, inside)
+            self._last_places = _Places(xy_mm.copy(), hit, corners, inside, weights)
+        return self._last_places
+
+
+def normals_of(slopes: Array) -> Array:
+    """(M, 3) unit normals, out of the front, of a surface with gradients (M, 3, 2); NaN where unknown."""
+    (ax, ay, az), (bx, by, bz) = slopes.transpose(2, 1, 0)
+    normal = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    return np.asarray(normal / np.sqrt(np.einsum("mk,mk->m", normal, normal))[:, None])
 
 
 def hermite_along_edge(start: Array, end: Array, slope: Array, slope_end: Array, fraction: Array) -> Array:
@@ -170,9 +207,7 @@ def hermite_along_edge(start: Array, end: Array, slope: Array, slope_end: Array,
     """
     t = fraction[:, None]
     parts = ((1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t), t * (1 - t) ** 2, -t * t * (1 - t))
-    return np.asarray(
-        sum(part * value[:, None] for part, value in zip(parts, (start, end, slope, slope_end), strict=True))
-    )
+    return np.asarray(np.concatenate(parts, axis=1) @ np.stack([start, end, slope, slope_end], axis=1))
 
 
 def clough_tocher(xy: Array, values: Array, gradients: Array, inside: Array) -> Array:

@@ -97,35 +97,32 @@ class WindowPlane(NamedTuple):
 
 
 class PlacedWindow(NamedTuple):
-    """A window's outer face in a camera's frame, and its derivatives by the pattern's pose (see ``Linearisation``).
+    """A window's outer face in a camera's frame, its derivatives by the pattern's pose (see ``Linearisation``), and the
+    limits of Newton's method; native loops read it.
 
     Attributes:
-        medium: the layers.
+        is_there: False in air.
+        gel_index, window_mm, window_index: the layers.
         normal: (3,) float64, a unit vector away from the camera.
         distance_mm: from the camera to the plane; not above 0 where the camera would stand within the medium.
         normal_by_pose: (3, 6) float64.
         distance_by_pose: (6,) float64.
     """
 
-    medium: Medium
+    is_there: bool
+    gel_index: float
+    window_mm: float
+    window_index: float
     normal: Array
     distance_mm: float
     normal_by_pose: Array
     distance_by_pose: Array
+    max_iterations: int = MAX_ITERATIONS
+    converged: float = CONVERGED
+    touching_mm: float = TOUCHING_MM
 
 
-class Directions(NamedTuple):
-    """The directions in which a camera sees N points, in its frame; NaN for points that it does not see.
-
-    Attributes:
-        xyz: (N, 3) float64, of any length.
-        by_point: (N, 3, 3) float64, derivatives by the points in the camera's frame.
-        by_pose: (N, 3, 6) float64, derivatives by the pattern's pose.
-    """
-
-    xyz: Array
-    by_point: Array
-    by_pose: Array
+NO_WINDOW = PlacedWindow(False, 1.0, 0.0, 1.0, np.zeros(3), 0.0, np.zeros((3, 6)), np.zeros(6))
 
 
 class Lines(NamedTuple):
@@ -150,13 +147,14 @@ def place_window(medium: Medium, plane: WindowPlane | None, rotation: Array, shi
         rotation: (3, 3).
         shift_mm: (3,).
     """
+    layers = True, medium._gel_index, medium.window_mm, medium._window_index
     if plane is not None:
-        return PlacedWindow(medium, np.array(plane.normal), plane.distance_mm, np.zeros((3, 6)), np.zeros(6))
-    normal = rotation[:, 2] if rotation[:, 2] @ shift_mm > 0 else -rotation[:, 2]
+        return PlacedWindow(*layers, np.array(plane.normal), plane.distance_mm, np.zeros((3, 6)), np.zeros(6))
+    normal = np.ascontiguousarray(rotation[:, 2] if rotation[:, 2] @ shift_mm > 0 else -rotation[:, 2])
     normal_by_pose = np.column_stack([-cross_matrix(normal[None])[0], np.zeros((3, 3))])
     distance_by_pose = shift_mm @ normal_by_pose + np.concatenate([np.zeros(3), normal])
     distance_mm = float(normal @ shift_mm) - medium.gel_mm - medium.window_mm
-    return PlacedWindow(medium, normal, distance_mm, normal_by_pose, distance_by_pose)
+    return PlacedWindow(*layers, normal, distance_mm, normal_by_pose, distance_by_pose)
 
 
 def gel_depth_mm(window: PlacedWindow, xyz_mm: Array) -> Array:
@@ -164,86 +162,9 @@ def gel_depth_mm(window: PlacedWindow, xyz_mm: Array) -> Array:
 
     NaN for points within the window, and for all points where the camera would stand within the medium.
     """
-    depth = xyz_mm @ window.normal - window.distance_mm - window.medium.window_mm
+    depth = xyz_mm @ window.normal - window.distance_mm - window.window_mm
     seen = (depth >= -TOUCHING_MM) & (window.distance_mm > 0)
     return np.asarray(np.where(seen, np.maximum(depth, 0.0), np.nan))
-
-
-def refract_points(window: PlacedWindow, rotated: Array, shift_mm: Array) -> Directions:
-    """The directions in which the camera sees points through window and gel.
-
-    Args:
-        window: in the camera's frame.
-        rotated: (N, 3) mm, the points along the camera's axes, from the layout's origin.
-        shift_mm: (3,) the layout's origin in the camera's frame.
-    """
-    medium, n, h = window.medium, window.normal, window.distance_mm
-    camera = rotated + shift_mm
-    gel = gel_depth_mm(window, camera)
-    beside = camera - (camera @ n)[:, None] * n
-    radius = np.linalg.norm(beside, axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        outward = np.where(radius[:, None] > 0, beside / radius[:, None], 0.0)
-    tangent = _solve_tangent(medium, h, gel, radius)
-    depth, slope = _apparent_depth(medium, h, gel, tangent)
-    in_gel = tangent * _sideways(tangent, medium._gel_index)
-    radial = outward[:, :, None] * outward[:, None, :]
-    # by the part of the point across the normal
-    across = radial / slope[:, None, None] + (np.eye(3) - radial) / depth[:, None, None]
-    along = outward * (in_gel / slope)[:, None]
-    by_point = across - across @ n[:, None] * n - along[:, :, None] * n
-    by_normal = (
-        np.eye(3)
-        - (n[:, None] / depth[:, None, None] + along[:, :, None]) * beside[:, None, :]
-        - (camera @ n)[:, None, None] * across
-    )
-    by_distance = outward * ((in_gel - tangent) / slope)[:, None]
-    by_pose = by_point @ _point_by_pose(rotated) + by_normal @ window.normal_by_pose
-    by_pose += by_distance[:, :, None] * window.distance_by_pose
-    return Directions(n + outward * tangent[:, None], by_point, by_pose)
-
-
-def refract_rays(window: PlacedWindow, direction: Array) -> Lines:
-    """The lines of sight behind the window, in the camera's frame, of rays (N, 3) that leave the camera."""
-    medium, n, h = window.medium, window.normal, window.distance_mm
-    forward = direction @ n
-    forward = np.where((forward > 0) & (h > 0), forward, np.nan)
-    beside = direction / forward[:, None] - n
-    tangent = np.linalg.norm(beside, axis=1)
-    sideways = h + medium.window_mm * _sideways(tangent, medium._window_index)
-    origin = (h + medium.window_mm) * n + beside * sideways[:, None]
-    inner = n + beside * _sideways(tangent, medium._gel_index)[:, None]
-    return Lines(origin, np.asarray(inner / np.linalg.norm(inner, axis=1, keepdims=True)))
-
-
-def _sideways(tangent: Array, index: float) -> Array:
-    """(N,) k(q; m), see the module: the sideways offset per depth, over q."""
-    return np.asarray(1 / np.sqrt(index**2 + (index**2 - 1) * tangent**2))
-
-
-def _apparent_depth(medium: Medium, distance_mm: float, gel_mm: Array, tangent: Array) -> tuple[Array, Array]:
-    """(N,) r / q and (N,) dr / dq, see the module."""
-    in_window, in_gel = (_sideways(tangent, m) for m in (medium._window_index, medium._gel_index))
-    depth = distance_mm + medium.window_mm * in_window + gel_mm * in_gel
-    slope = distance_mm + medium.window_mm * medium._window_index**2 * in_window**3
-    return depth, slope + gel_mm * medium._gel_index**2 * in_gel**3
-
-
-def _solve_tangent(medium: Medium, distance_mm: float, gel_mm: Array, radius_mm: Array) -> Array:
-    """(N,) q with r(q) = ``radius_mm``, see the module; NaN where ``gel_mm`` is."""
-    tangent = np.asarray(radius_mm / (distance_mm + medium.window_mm + gel_mm))
-    for _ in range(MAX_ITERATIONS):
-        depth, slope = _apparent_depth(medium, distance_mm, gel_mm, tangent)
-        step = (radius_mm - tangent * depth) / slope
-        tangent = tangent + step
-        if not (np.abs(step) > CONVERGED * (1 + tangent)).any():
-            break
-    return tangent
-
-
-def _point_by_pose(rotated: Array) -> Array:
-    """(N, 3, 6) derivatives of points (N, 3), along the camera's axes from the layout's origin, by the pose."""
-    return np.concatenate([-cross_matrix(rotated), np.tile(np.eye(3), (len(rotated), 1, 1))], axis=2)
 
 
 def cross_matrix(vectors: Array) -> Array:

@@ -16,7 +16,7 @@ from extractor.errors import PoseError
 from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.result import SIDE_REASONS, Markers, Status, VirtualStatus
 from extractor.space.camera import Array, View, is_finite
-from extractor.space.field import Field, hermite_along_edge
+from extractor.space.field import Field, hermite_along_edge, normals_of
 from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
 from extractor.space.triangulation import (
@@ -159,7 +159,7 @@ class Reconstructor:
             if rest is not None
             else np.zeros((len(self._deviating), *flat.shape))
         )
-        self._rest_virtual_mm = self._virtual(self.rest_xyz_mm)
+        self._rest_virtual_mm = self._virtual(self.rest_xyz_mm, self.field.gradients(self.rest_xyz_mm))
 
     def reconstruct(self, markers: Sequence[Markers | None]) -> Shape:
         """The surface that the views show; a view without a pattern raises no error.
@@ -175,9 +175,10 @@ class Reconstructor:
         ]
         status = np.max(by_view, axis=0)
         status = np.where(points.reason == PointReason.NONE, status, Status.LOST).astype(np.uint8)
-        normals = self.field.normals(points.xyz_mm)
-        virtual_mm = self._virtual(points.xyz_mm)
-        known = is_finite(virtual_mm)
+        slopes = self.field.gradients(points.xyz_mm)
+        normals = normals_of(slopes)
+        virtual_mm = self._virtual(points.xyz_mm, slopes)
+        known = np.isfinite(np.einsum("emk->em", virtual_mm))
         cov = points.cov_mm2 + _propagate_covariance(points.by_pose, self.poses.cov)
         return Shape(
             xyz_mm=points.xyz_mm,
@@ -329,16 +330,15 @@ class Reconstructor:
         moved = points.by_pose - self._rest.by_pose
         return points.cov_mm2 + self._rest.cov_mm2 + _propagate_covariance(moved, self.poses.cov)
 
-    def _virtual(self, xyz_mm: Array) -> Array:
-        """(E, m, 3) mm, the virtual markers on the smooth surface through markers (M, 3).
+    def _virtual(self, xyz_mm: Array, slopes: Array) -> Array:
+        """(E, m, 3) mm, the virtual markers on the smooth surface through markers (M, 3) with gradients (M, 3, 2).
 
         Where too few neighbours are known, the chord replaces the slope.
         """
         start, end = self.layout.edges.T
         step = self.layout.xy_mm[end] - self.layout.xy_mm[start]
-        slopes = self.field.gradients(xyz_mm)
         chord = xyz_mm[end] - xyz_mm[start]
-        at_ends = [np.einsum("ekd,ed->ek", slopes[ids], step) for ids in (start, end)]
+        at_ends = [(slopes[ids] @ step[:, :, None])[..., 0] for ids in (start, end)]
         first, last = (np.where(np.isfinite(slope), slope, chord) for slope in at_ends)
         return hermite_along_edge(xyz_mm[start], xyz_mm[end], first, last, self._fractions)
 
@@ -349,19 +349,19 @@ class Reconstructor:
 
     def _virtual_cov(self, cov: Array, known: NDArray[np.bool_]) -> Array:
         """(E, m, 3, 3) mm^2, from the covariances (M, 3, 3) of the edge's markers, without the slopes at its ends."""
-        flat = cov.reshape(len(cov), 9)
-        start, end = self.layout.edges.T
-        share = 3 * self._fractions**2 - 2 * self._fractions**3
-        virtual = (1 - share[:, None]) ** 2 * flat[start, None] + share[:, None] ** 2 * flat[end, None]
-        return np.asarray(np.where(known[..., None, None], virtual.reshape(*known.shape, 3, 3), np.nan))
+        share = (3 * self._fractions**2 - 2 * self._fractions**3)[:, None]
+        both = np.concatenate([(1 - share) ** 2, share**2], axis=1)
+        virtual = (both @ cov.reshape(len(cov), 9)[self.layout.edges]).reshape(*known.shape, 3, 3)
+        virtual[~known] = np.nan
+        return np.asarray(virtual)
 
     def _virtual_normals(self, normals: Array, known: NDArray[np.bool_]) -> Array:
         """(E, m, 3) unit vectors between the normals (M, 3) of the edge's markers."""
-        start, end = self.layout.edges.T
         t = self._fractions[:, None]
-        mixed = (1 - t) * normals[start, None] + t * normals[end, None]
-        unit = mixed / np.linalg.norm(mixed, axis=2, keepdims=True)
-        return np.asarray(np.where(known[..., None], unit, np.nan))
+        mixed = np.concatenate([1 - t, t], axis=1) @ normals[self.layout.edges]
+        mixed /= np.sqrt(np.einsum("emk,emk->em", mixed, mixed))[..., None]
+        mixed[~known] = np.nan
+        return np.asarray(mixed)
 
 
 def _has_position(markers: Markers) -> NDArray[np.bool_]:
@@ -376,9 +376,3 @@ def appears_mirrored(view: View) -> bool:
 def _propagate_covariance(by_pose: Array, cov: Array) -> Array:
     """(N, 3, 3) covariances J C J^T for derivatives J (N, 3, 6 V) and the poses' covariance C (6 V, 6 V)."""
     return np.asarray(by_pose @ cov @ np.swapaxes(by_pose, 1, 2))
-
-
-def translate_markers(markers: Markers, offset_px: tuple[float, float]) -> Markers:
-    """The same markers in a frame whose origin lies this offset (px) further left and up."""
-    offset = np.asarray(offset_px, np.float64)
-    return replace(markers, xy_px=markers.xy_px + offset, virtual_xy_px=markers.virtual_xy_px + offset)

@@ -24,7 +24,7 @@ from extractor.presets import Preset
 from extractor.result import Markers
 from extractor.space.camera import View
 from extractor.space.pose import estimate_poses
-from extractor.space.reconstruction import Reconstructor, Shape, appears_mirrored, translate_markers
+from extractor.space.reconstruction import Reconstructor, Shape, appears_mirrored
 from extractor.space.rig import Rig
 from extractor.track.displacement import Rest
 from extractor.track.tracker import FrameStatus, Tracked, Tracker
@@ -121,7 +121,7 @@ class ViewExtractor:
         pictures = _images_by_view(image, self.rig)
         for view, shown, picture in zip(self.rig.views, self._sides, pictures, strict=True):
             markers = self._extractors[shown].extract(crop_to_view(picture, view))
-            found.append(translate_markers(markers, _view_origin_px(view)))
+            found.append(markers.moved(_view_origin_px(view)))
         return tuple(found)
 
 
@@ -227,7 +227,7 @@ class ShapeTracker:
         except ImageError as error:
             part, reason = None, str(error)
         frame = tracker.track(part, time_s=time_s, reason=reason)
-        return replace(frame, markers=translate_markers(frame.markers, _view_origin_px(view)))
+        return replace(frame, markers=frame.markers.moved(_view_origin_px(view)))
 
 
 def _frame_reason(rig: Rig, tracked: Sequence[Tracked], shape: Shape, found: bool) -> str:

@@ -20,7 +20,7 @@ from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.rules import RULES
 from benchmarks.suites.ablation.trial import PictureScore, read_without, score_reading
 from benchmarks.suites.ablation.worker import Reading
-from benchmarks.support.code_copy import ROOT, CodeCopy, Replacement, replaced_text
+from benchmarks.suites.code_copy import ROOT, CodeCopy, Replacement, replaced_text
 from cmpdesign.scene import standard_layout
 from extractor import Status
 

@@ -14,9 +14,8 @@ from benchmarks.suites.scoring.calibration import (
     BEYOND_D2,
     COLUMNS,
     NOMINAL_BEYOND_SHARE,
-    calibration_cells,
-    calibration_head,
-    calibration_line,
+    calibration_table,
+    calibration_values,
     squared_distances,
     summarise,
 )
@@ -114,12 +113,14 @@ def test_few_pictures_have_no_interval_and_none_has_no_figure() -> None:
     assert (one.pictures, one.count) == (1, 5) and math.isnan(one.z.low)
     assert summarise([]).count == 0 and math.isnan(summarise([]).z.value)
     assert squared_distances(np.empty((0, 2)), np.empty((0, 2, 2))).shape == (0,)
-    assert calibration_cells(summarise([])) == ("0", "0", "-", "-", "-", "-", "-")
+    (cells,) = calibration_table("", {"": summarise([])}).cells()
+    assert cells == ["", "0", "0", "-", "- -", "-", "-", "- -", "0"]
 
 
 def test_a_row_has_the_columns_of_its_head() -> None:
     found = summarise(pictures_of(normal_errors(5)))
-    head, line = calibration_head("kind"), calibration_line("dirt", found)
-    assert len(head) == len(line) and len(calibration_cells(found)) == len(COLUMNS)
-    assert line.startswith("dirt ") and f"{found.z.low:.2f} to {found.z.high:.2f}" in line
-    assert "3 singular" in calibration_line("", summarise([np.array([1.0, np.inf, np.inf, np.inf])]))
+    head, line = str(calibration_table("", {"dirt": found})).splitlines()
+    assert len(head) == len(line) and len(calibration_values(found)) == len(COLUMNS)
+    assert line.startswith("dirt ") and f"{found.z.low:.2f} {found.z.high:.2f}" in line
+    infinite = summarise([np.array([1.0, np.inf, np.inf, np.inf])])
+    assert calibration_values(infinite)[-1] == infinite.singular == 3

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.calibration.run import main, read_jobs, rows_text
+from benchmarks.calibration.__main__ import main
+from benchmarks.frame.conditions import commit_seed
+from benchmarks.frame.parallel import results_of
 from benchmarks.suites.calibration.damaged import DAMAGE_KINDS, MILD_KINDS
 from benchmarks.suites.calibration.plain import scattered_layout
-from benchmarks.suites.calibration.reading import SuiteJob, calibration_rows, read_pictures
+from benchmarks.suites.calibration.reading import SuiteJob, calibration_rows, in_order, read_pictures
 from benchmarks.suites.calibration.suites import suites_by_name, usual_seed
-from benchmarks.suites.camera.cases import KINDS, commit_seed
+from benchmarks.suites.camera.cases import KINDS
 from benchmarks.suites.scoring.squares import POSITIONS, nearest_truth, picture_squares
 from benchmarks.suites.stress.frames import PATTERNS, plain_frame
 from cmpdesign.files.layout_json import layout_to_json
@@ -79,11 +81,13 @@ def test_squares_are_of_each_status_and_of_the_pattern_that_was_read() -> None:
 
 def test_parts_of_a_suite_are_the_suite() -> None:
     jobs = [SuiteJob("scatter", ("balanced",), True, 0, part, 2) for part in range(2)]
-    apart, whole = read_jobs(jobs, 1), read_pictures(SuiteJob("scatter", ("balanced",), True))
+    apart, whole = (
+        in_order(results_of(read_pictures, jobs, 1)),
+        read_pictures(SuiteJob("scatter", ("balanced",), True)),
+    )
     assert [reading.number for reading in apart] == [reading.number for reading in whole] == list(range(9))
     assert calibration_rows(apart) == calibration_rows(whole)
     rows = calibration_rows(whole)
-    assert rows_text(rows).splitlines()[1] == "-- scatter"
     together = [
         row.calibration.count for row in rows if (row.kind, row.positions) == ("together", "measured")
     ]
@@ -117,12 +121,12 @@ def test_a_quick_run_prints_and_writes(tmp_path: Path, capsys: pytest.CaptureFix
     arguments = ["--quick", "--preset", "balanced", "--suite", "scatter", "--processes", "1"]
     assert main([*arguments, "--json", str(out)]) == 0
     text = capsys.readouterr().out
-    assert "0.5 px: virtual, measured" in text and "9 pictures, seed of scatter 0;" in text
+    assert "0.5 px: virtual, measured" in text and "9 pictures, seed of scatter 0" in text
     written = json.loads(out.read_text(encoding="utf-8"))
-    assert {row["kind"] for row in written["rows"]} == {"0.05 px", "0.2 px", "0.5 px", "together"}
-    row = next(row for row in written["rows"] if (row["kind"], row["positions"]) == ("together", "measured"))
-    calibration = row["calibration"]
-    assert calibration["pictures"] == 9 and calibration["singular"] == 0
-    assert calibration["z"]["low"] <= calibration["z"]["value"] <= calibration["z"]["high"]
+    rows = {row["errors over covariances"]: row for row in written["tables"]["balanced, scatter"]}
+    assert {name.partition(":")[0] for name in rows} == {"0.05 px", "0.2 px", "0.5 px", "together"}
+    row = rows["together: measured"]
+    assert row["pictures"] == 9 and row["singular"] == 0
+    assert row["z, 95 %"][0] <= row["z"] <= row["z, 95 %"][1]
     with pytest.raises(SystemExit):
         main(["--suite", "nothing"])

@@ -15,10 +15,9 @@ from benchmarks.damage import (
     count_swapped_markers,
     main,
     parse_case,
-    read_one_image,
     sample_cases,
     totals_by_kind,
-    totals_table,
+    wrong_lines,
 )
 from benchmarks.suites.scoring.reading import cached_extractor, read_case
 from benchmarks.suites.stress.conditions import BY_NAME
@@ -119,7 +118,7 @@ def test_totals_name_the_images_with_wrong_markers() -> None:
     assert [row.kind for row in rows] == [case.kind, "together"]
     assert (rows[-1].images, rows[-1].wrong, rows[-1].others) == (2, 3, 2)
     assert rows[-1].kept == 2 * result.score.kept
-    assert f"WRONG    3  {case_name(case)}" in totals_table(rows)
+    assert wrong_lines(rows[-1]) == [f"WRONG    3  {case_name(case)}"]
     silent = replace(result, reason="reference_lost")
     assert (
         totals_by_kind([DamageResult(silent, 0)])[-1].unread == 1
@@ -134,11 +133,12 @@ def test_a_run_prints_and_writes_and_one_image_is_saved(
     assert main(["--images", "3", "--seed", "300", "--processes", "1", "--json", str(out)]) == 0
     text = capsys.readouterr().out
     assert "3 images, seeds 300 to 302" in text and "together: virtual, measured" in text
-    rows = json.loads(out.read_text())
-    assert [row["images"] for row in rows] == [1, 1, 1, 3]
-    assert [row["calibrations"]["measured"]["pictures"] for row in rows] == [1, 1, 1, 3]
-    assert rows[0]["calibrations"]["measured"]["z"]["low"] is None  # one picture has no interval
-    assert read_one_image(parse_case("random scratches/honeycomb/300"), tmp_path).score.wrong == 0
+    totals, stated = json.loads(out.read_text())["tables"].values()
+    assert [row["images"] for row in totals] == [1, 1, 1, 3]
+    measured = [row for row in stated if row["errors over covariances"].endswith(": measured")]
+    assert [row["pictures"] for row in measured] == [1, 1, 1, 3]
+    assert measured[0]["z, 95 %"] == [None, None]  # one picture has no interval
+    assert main(["--only", "random scratches/honeycomb/300", "--save", str(tmp_path)]) == 0
     assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png"}
     with pytest.raises(SystemExit):
         main(["--only", "nothing"])

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.photoreal.page import documentation_blocks, pictures_sheet
-from benchmarks.photoreal.report import family_rows, measured_record
-from benchmarks.photoreal.run import main
+from benchmarks.photoreal.__main__ import family_rows, main, measured_record
+from benchmarks.photoreal.page import IMAGE, page
 from benchmarks.suites.photoreal.pictures import (
     NO_PATTERN,
     PICTURES_FOLDER,
@@ -87,11 +86,11 @@ def test_a_reason_is_compared_with_the_truth() -> None:
 
 def test_a_folder_without_a_family_has_no_row_of_it(capsys: pytest.CaptureFixture[str]) -> None:
     results = [read_picture(BY_NAME["G00_ball"]), read_picture(BY_NAME["N00_random_triangles"])]
-    assert [row.name for row in family_rows(results)] == ["G", "N", "A to H, O", "A to H", "all but N"]
-    assert [row.name for row in family_rows(results[1:])] == ["N"]
-    block = documentation_blocks(measured_record(results))["photoreal"]
-    assert "G                  1     1" in block
-    assert pictures_sheet(measured_record(results))[:2] == b"\xff\xd8"
+    assert [row[0] for row in family_rows(results)] == ["G", "N", "A to H, O", "A to H", "all but N"]
+    assert [row[0] for row in family_rows(results[1:])] == ["N"]
+    found = page(measured_record(results))
+    assert "G                 1     1" in found.blocks["photoreal"]
+    assert found.pictures[IMAGE][:2] == b"\xff\xd8"
     assert main(["--family", "G", "--quick", "--processes", "1", "--each"]) == 0
     assert "G00_ball" in capsys.readouterr().out
 
@@ -100,6 +99,6 @@ def test_a_folder_without_pictures_is_one_clear_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
-        main([str(tmp_path)])
+        main(["--folder", str(tmp_path)])
     error = capsys.readouterr().err
     assert "index.json is no index of pictures" in error and "give a folder" in error

@@ -10,7 +10,7 @@ import resvg_py
 from PIL import Image
 
 from cmpdesign.products.laser.coupon.design import load_coupon
-from docs.figures.pictures.tutorials.page_files import coupon_scan
+from tools.figures.pictures.tutorials.page_files import coupon_scan
 
 SCAN_DPI = 300
 

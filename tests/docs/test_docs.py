@@ -42,8 +42,8 @@ from cmpdesign.inputs import documents
 from cmpdesign.inputs import files as inputs
 from cmpdesign.inputs import names as lines
 from cmpdesign.patterns import registered_patterns
-from docs.figures import everything, fields
 from tests.docs.stand_ins import make_stand_in
+from tools.figures import everything, fields
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -270,15 +270,15 @@ def drawn() -> dict[str, bytes]:
 
 def test_every_picture_is_what_its_script_draws(drawn: dict[str, bytes]) -> None:
     """SVG to the byte; PNG once blurred, as sub-pixel shifts of thin lines and fonts do not make another picture."""
-    assert set(drawn) == {path.name for path in IMAGES.iterdir()}, "run python -m docs.figures"
+    assert set(drawn) == {path.name for path in IMAGES.iterdir()}, "run python -m tools.figures"
     for name, data in drawn.items():
         committed = (IMAGES / name).read_bytes()
         if name.endswith(".svg"):
-            assert data == committed, f"{name}: run python -m docs.figures"
+            assert data == committed, f"{name}: run python -m tools.figures"
             continue
         new, old = blurred(data), blurred(committed)
-        assert new.shape == old.shape, f"{name}: run python -m docs.figures"
-        assert np.abs(new - old).mean() < 1.0, f"{name}: run python -m docs.figures"
+        assert new.shape == old.shape, f"{name}: run python -m tools.figures"
+        assert np.abs(new - old).mean() < 1.0, f"{name}: run python -m tools.figures"
 
 
 def blurred(png: bytes) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -295,7 +295,7 @@ def test_pictures_are_small() -> None:
 
 def test_generated_pages_are_up_to_date() -> None:
     for path, text in everything.pages().items():
-        assert path.read_text(encoding="utf-8") == text, f"{path.name}: run python -m docs.figures"
+        assert path.read_text(encoding="utf-8") == text, f"{path.name}: run python -m tools.figures"
 
 
 def test_everything_registered_is_in_the_gallery(drawn: dict[str, bytes]) -> None:

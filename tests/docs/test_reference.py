@@ -8,9 +8,9 @@ from pathlib import Path
 import cmpdesign
 import extractor
 from cmpdesign.design.design import Design
-from docs.figures import api, fields, reasons
-from docs.figures.pictures import failures, lengths
 from extractor import Extractor, Reason
+from tools.figures import api, fields, reasons
+from tools.figures.pictures import failures, lengths
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.suites.calibration.camera import camera_cases
+from benchmarks.suites.scenes import SCENE_KINDS, SceneCase, cached_extractor, inner_markers
 from benchmarks.suites.scoring.calibration import squared_distances, summarise
-from benchmarks.support.scenes import SCENE_KINDS, SceneCase, cached_extractor, inner_markers
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import render
 from extractor import Extractor, Status, VirtualStatus, parse_layout

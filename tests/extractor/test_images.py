@@ -123,7 +123,7 @@ def test_lost_markers_are_nan_and_lost() -> None:
 def test_every_stage_is_timed_in_order() -> None:
     markers = extractor().extract(picture().image)
     names = list(markers.timings_ms)
-    assert names == [*STAGES, "repair", "virtual", "quality"]
+    assert names == [*STAGES, "repair", "quality"]
     assert all(0 <= ms < 60_000 for ms in markers.timings_ms.values())
     assert set(markers.stages) == set(names)
     nothing = extractor().extract(np.zeros((64, 64, 3), np.uint8))

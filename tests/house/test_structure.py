@@ -33,7 +33,7 @@ PACKAGES = ("extractor", "cmpdesign")
 ROOMS = {
     "cmpdesign": (
         "errors libraries units workers watch inputs documents patterns design layout files sensor reading calibration"
-        " contact scene products tracking evaluate data api proposal studio cli demo __main__"
+        " contact scene products tracking runtime evaluate data api proposal studio cli demo __main__"
     ),
     "extractor": (
         "errors frozen_record quality result presets numeric layout image cells localmap numbering refine complete"

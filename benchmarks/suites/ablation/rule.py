@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import PurePosixPath
 from typing import Literal, NamedTuple
 
-from benchmarks.support.code_copy import Replacement
+from benchmarks.suites.code_copy import Replacement
 
 Kind = Literal["accuracy", "errors and time", "no wrong id"]
 

@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.worker import Reading
+from benchmarks.suites.code_copy import CodeCopy, Replacement, environment
 from benchmarks.suites.scoring.calibration import BEYOND_D2, squared_distances
-from benchmarks.support.code_copy import CodeCopy, Replacement, environment
 from extractor import Status
 
 WRONG_POSITION, SAME_PLACE = (

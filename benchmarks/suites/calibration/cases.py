@@ -9,9 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.scenes import SceneCase, standard_layout
 from benchmarks.suites.scoring.squares import TruePositions
 from benchmarks.suites.stress.frames import PatternFrame
-from benchmarks.support.scenes import SceneCase, standard_layout
 from cmpdesign.layout.layout import Layout
 
 

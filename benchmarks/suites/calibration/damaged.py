@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.suites.calibration.cases import CalibrationCase, frame_case, random_view
+from benchmarks.suites.scenes import SceneCase
 from benchmarks.suites.stress.conditions import BY_NAME, make_cases
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, cached_layout
 from benchmarks.suites.stress.kinds import make_frame
-from benchmarks.support.scenes import SceneCase
 from cmpdesign.scene import Blob, Camera, Damage, Press, Scratch, Twist, composed, standard_scene
 from cmpdesign.scene.standard import BLACK_RGB
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.suites.calibration.cases import CalibrationCase, frame_case, random_view
+from benchmarks.suites.scenes import SCENE_KINDS, SceneCase
 from benchmarks.suites.stress.frames import PATTERNS
-from benchmarks.support.scenes import SCENE_KINDS, SceneCase
 from cmpdesign.layout.layout import Layout
 
 BLURS_PX = (1.0, 1.6)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
@@ -77,6 +77,13 @@ def _readings(job: SuiteJob) -> Iterator[PictureReading]:
             markers = _cached_reader(case.layout, preset).extract(shot.image)
             squares = picture_squares(markers, nearest_truth(markers, shot.truths))
             yield PictureReading(job.suite, case.kind, number, preset, squares)
+
+
+def in_order(readings_of_jobs: Iterable[Sequence[PictureReading]]) -> list[PictureReading]:
+    """The readings of all jobs in the order of the suites, and of the pictures in each."""
+    found = [reading for readings in readings_of_jobs for reading in readings]
+    suites = list(dict.fromkeys(reading.suite for reading in found))
+    return sorted(found, key=lambda reading: (suites.index(reading.suite), reading.number))
 
 
 def calibration_rows(readings: Sequence[PictureReading]) -> list[CalibrationRow]:

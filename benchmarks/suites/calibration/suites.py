@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from benchmarks.frame.conditions import commit_seed
 from benchmarks.suites.calibration.camera import camera_cases
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.calibration.damaged import damage_cases, mild_dirt_cases, stress_cases
 from benchmarks.suites.calibration.plain import plain_cases, scatter_cases
-from benchmarks.suites.camera.cases import commit_seed
 
 SuiteCases = Callable[[bool, int], Iterator[CalibrationCase]]  # quick, seed -> cases
 CAMERA = "camera"

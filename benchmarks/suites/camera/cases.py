@@ -1,16 +1,11 @@
 """The pictures of a run: no effect, each effect alone at graded strength, all effects combined at random.
 
-A run's seed and a picture's number fix the picture. The default seed comes from the commit's hash, so that no rule can
-be tuned to
-the pictures: they change with the next commit.
+A run's seed and a picture's number fix the picture.
 """
 
 from __future__ import annotations
 
-import hashlib
-import subprocess
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -29,7 +24,6 @@ MAX_LAYERS, MIN_LAYERS = 11, 4
 FILLED_SHARE = 0.9  # of the image's height that the pattern takes at most, as long as it has ``MIN_LAYERS``
 ROW_PITCHES = 0.93  # height of a layer in pitches, the mean of the patterns and their orientations
 BLUR_PX = (0.6, 1.1)
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @dataclass(frozen=True)
@@ -66,20 +60,6 @@ def make_cases(pictures: int, seed: int) -> list[CameraCase]:
     return [CameraCase(seed, number) for number in range(pictures)]
 
 
-def parse_case(name: str, seed: int) -> CameraCase:
-    """The case of a name of ``CameraCase``, or of a number alone.
-
-    Raises:
-        ValueError: no picture has this name.
-    """
-    number = name.rpartition("/")[2]
-    case = CameraCase(seed, int(number)) if number.isdigit() else None
-    if case is None or name not in (number, case.name):
-        example = CameraCase(seed, len(TURN) - 1)
-        raise ValueError(f"no picture is named {name!r}; give one as {example.name!r} or its number")
-    return case
-
-
 def sample_chain(case: CameraCase) -> Chain:
     """The chain of a case: pattern and pose at random, then the effects in the order of a camera."""
     rng = np.random.default_rng([case.seed, case.number])
@@ -109,22 +89,3 @@ def sample_pose(rng: np.random.Generator) -> Pose:
         tilt_axis_deg=float(rng.uniform(0, 180)),
         centre_px=((SIZE_PX[0] - 1) / 2 + offset_x, (SIZE_PX[1] - 1) / 2 + offset_y),
     )
-
-
-def commit_seed(folder: Path = ROOT) -> int:
-    """The seed that the hash of the folder's commit gives.
-
-    Raises:
-        ValueError: the folder is no part of a repository.
-    """
-    command = ["git", "-C", str(folder), "rev-parse", "HEAD"]
-    try:
-        result = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
-    except (OSError, subprocess.SubprocessError):
-        raise ValueError(f"{folder} is no git repository with a commit; give a seed with --seed") from None
-    return seed_of_hash(result.stdout.strip())
-
-
-def seed_of_hash(commit: str) -> int:
-    """0 to 2**32 - 1, from a commit's hash."""
-    return int.from_bytes(hashlib.sha256(commit.encode()).digest()[:4], "big")

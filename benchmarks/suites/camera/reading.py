@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.suites.camera.cases import CameraCase, sample_chain
-from benchmarks.suites.camera.parts import Chain
 from benchmarks.suites.camera.shoot import CameraPicture, cached_layout, shoot
+from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges
 from benchmarks.suites.scoring.calibration import squared_distances
 from benchmarks.suites.scoring.contrast import neighbour_contrast
-from benchmarks.support.scenes import WRONG_SHARE, shortest_edges
 from cmpdesign.files.layout_json import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.presets import Preset
@@ -151,13 +150,3 @@ def marker_outcomes(picture: CameraPicture, markers: Markers) -> NDArray[np.str_
     distance_px = np.linalg.norm(markers.xy_px[numbers][:, None] - true_px, axis=2)
     outcome[numbers[distance_px.argmin(axis=1) != numbers]] = WRONG_ID
     return outcome
-
-
-def warm_up(preset: Preset) -> None:
-    """Load all modules before times are measured, and keep OpenCV to one thread."""
-    import cv2
-
-    cv2.setNumThreads(1)
-    chain = Chain()
-    picture = shoot(chain)
-    cached_extractor(chain.pose.pattern, chain.pose.layers, preset).extract(picture.image)

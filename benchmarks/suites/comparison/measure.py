@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from benchmarks.suites.comparison.methods import METHODS, REFERENCE_METHOD, Method
-from benchmarks.support.scenes import (
+from benchmarks.suites.scenes import (
     SCENE_KINDS,
     WRONG_SHARE,
     SceneCase,

@@ -16,7 +16,7 @@ from benchmarks.suites.article.corners import fit_plain_triangles
 from benchmarks.suites.article.graph import connect_corners
 from benchmarks.suites.article.numbering import make_lattice_tables, number_triangles
 from benchmarks.suites.article.regions import grow_from_hues
-from benchmarks.support.scenes import (
+from benchmarks.suites.scenes import (
     BOARD_LAYERS,
     SceneCase,
     cached_extractor,
@@ -35,7 +35,7 @@ HALF_WINDOW_PX = (
 )
 SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
 REFERENCE_METHOD = "OpenCV findChessboardCornersSB"
-MEASURING_STAGES = ("refine", "repair", "virtual")  # the stages after the 7th
+MEASURING_STAGES = ("refine", "repair")  # the stages after the 7th
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from benchmarks.suites.comparison.measure import (
     required_markers,
 )
 from benchmarks.suites.comparison.methods import METHODS, Method, Reading
-from benchmarks.support.scenes import STANDARD_BLUR_PX, STANDARD_PITCH_PX, Response, SceneCase
+from benchmarks.suites.scenes import STANDARD_BLUR_PX, STANDARD_PITCH_PX, Response, SceneCase
 from cmpdesign.scene import render
 from cmpdesign.scene.bounds.exact_bound import exact_bound
 from cmpdesign.scene.standard import STANDARD_SIZE
@@ -29,7 +29,6 @@ KINDS = (
     ("twist", STANDARD_PITCH_PX),
 )
 NAMES = (
-    "cmpdesign, fast",
     "cmpdesign, balanced",
     "cmpdesign, accurate",
     "cornerSubPix on our ids",

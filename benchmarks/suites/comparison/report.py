@@ -1,48 +1,36 @@
-"""The comparison as a table on the terminal, as Markdown and as a picture."""
+"""The comparison as tables, pages and a picture."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-
+from benchmarks.frame.conditions import conditions_text
+from benchmarks.frame.published import Page
+from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.comparison.measure import MethodResult
 from benchmarks.suites.comparison.methods import METHODS
 from benchmarks.suites.comparison.pooled import PooledResult
+from extractor.presets import PRESETS
 
-COLUMNS = (
-    "method",
-    "found",
-    "wrong",
-    "inner px",
-    "/ bound",
-    "all px",
-    "/ bound",
-    "bias px",
-    "ms",
-    "time / SB",
-)
-POOLED_COLUMNS = (
-    "method",
-    "scenes",
-    "found",
-    "wrong",
-    "RMS px",
-    "of the bound",
-    "inner px",
-    "of the bound",
-    "z",
-    "ms",
-)
+COLUMNS = {
+    "method": TEXT, "found": ".1%", "wrong": "d", "inner px": ".4f", "inner / bound": ".2f", "all px": ".4f",
+    "all / bound": ".2f", "bias px": ".4f", "ms": ".1f", "time / SB": ".3f",
+}  # fmt: skip
+PAGE_COLUMNS = {
+    "method": TEXT, "reads": TEXT, "found": ".0%", "wrong": "d", "RMS px": ".4f", "of the bound": ".2f",
+    "worst scene": TEXT, "ms": ".1f", "of SB's time": ".2f",
+}  # fmt: skip
+POOLED_COLUMNS = {
+    "method": TEXT, "scenes": "d", "found": ".1%", "wrong": "d", "RMS px": ".4f", "of the bound": ".2f",
+    "inner px": ".4f", "of their bound": ".2f", "z": ".2f", "ms": ".1f",
+}  # fmt: skip
 MARKS = {
     "flat": "o", "tilt": "^", "bulge": "s", "twist": "D", "blur 1.6 px": "v", "pitch 13 px": "*", "round": "h",
     "elliptical": "p",
 }  # fmt: skip
 COLORS = {
-    "cmpdesign, fast, markers only": "#a9d3f5",
-    "cmpdesign, fast": "#7fb3e6",
     "cmpdesign, balanced, markers only": "#5b97d6",
     "cmpdesign, balanced": "#2f78c4",
     "cmpdesign, accurate": "#123f73",
@@ -55,69 +43,108 @@ COLORS = {
     "chess-corners, its default": "#8bc34a",
     "chess-corners, saddle point": "#2e7d32",
 }
+# Figures of runs that are too long to be published with every change: what, figure, benchmark.
+STATED = (
+    (
+        "random damage, 2,100 pictures",
+        "16 of 779,800 markers off by more than 0.3 edges, none with another marker's id",
+        "damage",
+    ),
+    (
+        "two views, press of 1 mm",
+        "0.6 um across, 1.5 um in depth ([table](docs/how-to/reconstruction.md#how-precise))",
+        "reconstruction",
+    ),
+    (
+        "kerf from a photo of the coupon",
+        "5.1 um RMS ([table](docs/how-to/laser.md#measure-first))",
+        "kerf",
+    ),
+    ("molds of 1,452 cells as STEP", "11 s ([table](docs/how-to/molds.md#figures))", "molds"),
+    (
+        "start of a process to its first markers",
+        "twice the time to import numpy and OpenCV, 65 MB",
+        "startup",
+    ),
+)
 MIN_FOUND = 0.5  # of the markers; methods with a smaller share are not drawn
 
 
-def scene_table(scene: str, results: Sequence[MethodResult], caption: str = "") -> Table:
-    """One scene's results, for the terminal."""
-    table = Table(
-        title=scene, box=SIMPLE_HEAD, caption=caption or None, title_justify="left", caption_justify="left"
-    )
-    for number, column in enumerate(COLUMNS):
-        table.add_column(column, justify="right" if number else "left", no_wrap=True)
-    for r in results:
-        if r.scene == scene:
-            table.add_row(
-                r.method, f"{r.found_share:.1%}", str(r.wrong), f"{r.inner_px:.4f}",
-                f"{r.inner_px / r.bound_px:.2f}", f"{r.all_px:.4f}", f"{r.all_px / r.all_bound_px:.2f}",
-                f"{r.bias_px:.4f}", f"{r.ms:.1f}", f"{r.ratio:.3f}",
-            )  # fmt: skip
-    return table
+def scene_table(scene: str, results: Sequence[MethodResult], caption: str) -> Table:
+    """One scene's results."""
+    rows = [
+        (
+            r.method, r.found_share, r.wrong, r.inner_px, r.inner_px / r.bound_px, r.all_px, r.all_px / r.all_bound_px,
+            r.bias_px, r.ms, r.ratio,
+        )
+        for r in results
+        if r.scene == scene
+    ]  # fmt: skip
+    return Table(scene, COLUMNS, rows, caption)
 
 
-def comparison_markdown(results: Sequence[MethodResult]) -> str:
+def methods_table(results: Sequence[MethodResult]) -> Table:
     """One row per method: the standard scene, and the worst of all scenes."""
-    lines = [
-        "| method | reads | found | wrong | RMS px | of the bound | worst scene | ms | of SB's time |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for method in METHODS:
         of_method = [r for r in results if r.method == method.name]
         flat = next(r for r in of_method if r.scene == "flat")
         worst = max(of_method, key=lambda r: r.inner_px / r.bound_px)
-        cells = (
-            method.name, "checkerboard" if method.board else "pattern", f"{min(r.found_share for r in of_method):.0%}",
-            str(sum(r.wrong for r in of_method)), f"{flat.inner_px:.4f}", f"{flat.inner_px / flat.bound_px:.2f}",
-            f"{worst.inner_px / worst.bound_px:.2f}, {worst.scene}", f"{flat.ms:.1f}", f"{flat.ratio:.2f}",
-        )  # fmt: skip
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append((
+            method.name, "checkerboard" if method.board else "pattern", min(r.found_share for r in of_method),
+            sum(r.wrong for r in of_method), flat.inner_px, flat.inner_px / flat.bound_px,
+            f"{worst.inner_px / worst.bound_px:.2f}, {worst.scene}", flat.ms, flat.ratio,
+        ))  # fmt: skip
+    return Table("", PAGE_COLUMNS, rows)
 
 
 def pooled_table(results: Sequence[PooledResult], caption: str = "") -> Table:
-    """The pooled results, for the terminal."""
-    table = Table(
-        title="pooled", box=SIMPLE_HEAD, caption=caption or None, title_justify="left", caption_justify="left"
-    )
-    for number, column in enumerate(POOLED_COLUMNS):
-        table.add_column(column, justify="right" if number else "left", no_wrap=True)
-    for r in results:
-        table.add_row(*_pooled_cells(r))
-    return table
+    """The pooled results, one row per method."""
+    rows = [
+        (
+            r.method, r.scenes, r.found_share, r.wrong, r.rms_px, r.rms_px / r.bound_px, r.inner_px,
+            r.inner_px / r.inner_bound_px, r.z, r.ms,
+        )
+        for r in results
+    ]  # fmt: skip
+    return Table("pooled", POOLED_COLUMNS, rows, caption)
 
 
-def pooled_markdown(results: Sequence[PooledResult]) -> str:
-    """One row per method."""
-    rows = [POOLED_COLUMNS, ("---",) * len(POOLED_COLUMNS), *map(_pooled_cells, results)]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+def page(measured: Mapping[str, Any]) -> Page:
+    """Blocks and picture from the content of docs/measured/comparison.json."""
+    results = [MethodResult(**row) for row in measured["results"]]
+    pooled = [PooledResult(**row) for row in measured["pooled"]]
+    blocks = {
+        "comparison": methods_table(results).markdown(),
+        "comparison-pooled": pooled_table(pooled).markdown(),
+        "conditions": conditions_text(measured["conditions"]),
+        "figures": key_figures(results).markdown(),
+        "speed": f"{preset_times(results).markdown()}\n\nPrinted by `python -m benchmarks.comparison`.",
+    }
+    return Page(blocks, {"speed-error.png": comparison_picture(results)})
 
 
-def _pooled_cells(r: PooledResult) -> tuple[str, ...]:
-    return (
-        r.method, f"{r.scenes}", f"{r.found_share:.1%}", f"{r.wrong}", f"{r.rms_px:.4f}",
-        f"{r.rms_px / r.bound_px:.2f}", f"{r.inner_px:.4f}", f"{r.inner_px / r.inner_bound_px:.2f}",
-        "" if r.z is None else f"{r.z:.2f}", f"{r.ms:.1f}",
-    )  # fmt: skip
+def _flat(results: Sequence[MethodResult], preset: str) -> MethodResult:
+    return next(r for r in results if (r.method, r.scene) == (f"cmpdesign, {preset}", "flat"))
+
+
+def preset_times(results: Sequence[MethodResult]) -> Table:
+    """The table of docs/how-to/speed.md: the time and the error of every preset in the standard scene."""
+    flats = [(f"`{preset}`", _flat(results, preset)) for preset in PRESETS]
+    columns = {"preset": TEXT, "time of 397 markers, ms": ".1f", "error of the exact bound": ".2f"}
+    return Table("", columns, [(name, flat.ms, flat.inner_px / flat.bound_px) for name, flat in flats])
+
+
+def key_figures(results: Sequence[MethodResult]) -> Table:
+    """The table of README: what is measured, and the command that prints it."""
+    rows = []
+    for preset in PRESETS:
+        flat = _flat(results, preset)
+        of_bound = f"{flat.inner_px / flat.bound_px:.2f} of the [exact bound](docs/explanation/accuracy.md)"
+        figure = f"{flat.inner_px:.4f} px RMS per axis, {of_bound}; {flat.ms:.1f} ms"
+        rows.append((f"397 markers at 20 px, preset `{preset}`", figure, "comparison"))
+    named = [(what, figure, f"`python -m benchmarks.{name}`") for what, figure, name in [*rows, *STATED]]
+    return Table("", {"measured": TEXT, "figure": TEXT, "printed by": TEXT}, named)
 
 
 def comparison_picture(results: Sequence[MethodResult]) -> bytes:

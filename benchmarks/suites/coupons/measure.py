@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,7 @@ class CouponErrors:
     response: str
 
 
-@dataclass(frozen=True)
-class PooledErrors:
+class PooledErrors(NamedTuple):
     """Figures of several cases.
 
     Attributes:
@@ -55,15 +55,11 @@ def standard_coupon() -> Coupon:
     return design_coupon(complete_setup(load_design("honeycomb").laser))
 
 
-def read_case(coupon: Coupon, number: int, seed: int, known: bool = False) -> CouponErrors:
-    """Read a random case; ``known``: the response is stated to the reader."""
+def read_case(coupon: Coupon, number: int, seed: int) -> CouponErrors:
+    """Read a random case."""
     case = random_case(coupon, number, seed)
     image = photograph_coupon(coupon, case.kerf_mm, case.view)
-    reading = read_coupon(
-        coupon,
-        image,
-        response=case.view.response if known else None,
-    )
+    reading = read_coupon(coupon, image)
     widths = [width for one in reading.patches for width in (one.x, one.y)]
     true = np.array([case.kerf_mm[one.patch.name] for one in reading.patches]).ravel()
     return CouponErrors(

@@ -8,12 +8,14 @@ picture have errors in common (light, blur, estimated inks). Intervals are there
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from benchmarks.frame.table import TEXT, Table
 
 BEYOND_D2 = 11.83  # three standard deviations in two dimensions
 NOMINAL_BEYOND_SHARE = 0.0027
@@ -21,8 +23,10 @@ MEDIAN_D2 = 2 * math.log(2)  # of normal errors with the stated covariance
 MIN_DETERMINANT_SHARE = 1e-12  # of the product of the variances; a covariance below it is singular
 RESAMPLES, SEED = 2000, 20250101
 INTERVAL_PERCENT = (2.5, 97.5)
-COLUMNS = ("pictures", "count", "z", "95 %", "median z", "beyond %", "95 %")
-WIDTHS = (9, 9, 8, 16, 10, 10, 18)
+COLUMNS = {
+    "pictures": "d", "count": "d", "z": ".2f", "z, 95 %": ".2f", "median z": ".2f", "beyond": ".2%",
+    "beyond, 95 %": ".2%", "singular": "d",
+}  # fmt: skip
 Floats = NDArray[np.float64]
 
 
@@ -120,35 +124,16 @@ def _ratio_of_sums(numerator: Floats, denominator: Floats) -> Estimate:
     return Estimate(value, float(low), float(high))
 
 
-def calibration_cells(calibration: Calibration) -> tuple[str, ...]:
-    """The texts of one row, in the order of ``COLUMNS``; "-" for unknown values."""
+def calibration_values(calibration: Calibration) -> tuple[Any, ...]:
+    """The values of a row, in the order of ``COLUMNS``."""
     z, beyond = calibration.z, calibration.beyond
     return (
-        str(calibration.pictures),
-        str(calibration.count),
-        _number(z.value, 2),
-        _interval(z.low, z.high, 2),
-        _number(calibration.median_z, 2),
-        _number(100 * beyond.value, 2),
-        _interval(100 * beyond.low, 100 * beyond.high, 2),
-    )
+        calibration.pictures, calibration.count, z.value, (z.low, z.high), calibration.median_z, beyond.value,
+        (beyond.low, beyond.high), calibration.singular,
+    )  # fmt: skip
 
 
-def calibration_head(title: str = "", width: int = 40) -> str:
-    """The head of a table of ``calibration_line``; ``width`` characters for the names."""
-    return f"{title:<{width}}" + "".join(f"{c:>{w}}" for c, w in zip(COLUMNS, WIDTHS, strict=True))
-
-
-def calibration_line(name: str, calibration: Calibration, width: int = 40) -> str:
-    """One row of a table below ``calibration_head``; singular covariances are named at its end."""
-    cells = zip(calibration_cells(calibration), WIDTHS, strict=True)
-    singular = f"  {calibration.singular} singular" if calibration.singular else ""
-    return f"{name:<{width}}" + "".join(f"{cell:>{w}}" for cell, w in cells) + singular
-
-
-def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
-
-
-def _interval(low: float, high: float, digits: int) -> str:
-    return f"{low:.{digits}f} to {high:.{digits}f}" if math.isfinite(low) else "-"
+def calibration_table(title: str, found: Mapping[str, Calibration]) -> Table:
+    """A row for every name."""
+    rows = [(name, *calibration_values(calibration)) for name, calibration in found.items()]
+    return Table(title, {"errors over covariances": TEXT} | COLUMNS, rows)

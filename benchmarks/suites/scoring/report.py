@@ -1,32 +1,27 @@
-"""Reports of the stress suite: failures by severity, one row per condition, a plot, a file."""
+"""Reports of the stress suite: failures by severity, and one row per condition."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.suites.scoring.calibration import Calibration, calibration_head, summarise
+from benchmarks.frame.table import TEXT, Table
+from benchmarks.suites.scoring.calibration import Calibration, summarise
 from benchmarks.suites.scoring.reading import CaseResult
-from benchmarks.suites.scoring.squares import MEASURED, calibration_lines
+from benchmarks.suites.scoring.squares import MEASURED
 from benchmarks.suites.stress.kinds import ConditionKind
-from benchmarks.support.machine import null_for_nan
-from cmpdesign.files.atomic import staged_file, write_file
 
 PROMISED_SHARE = 0.99
 SLOWEST_RATIO = 1.3
-COLORS = {
-    "measured": "#3a8f5c",
-    "repaired": "#7cc6e8",
-    "fitted": "#3b6fb5",
-    "lost": "#d9d9d9",
-    "wrong": "#d62728",
-}
+COLUMNS = {
+    "condition": TEXT, "group": TEXT, "promised": TEXT, "visible": "d", "measured": ".2%", "repaired": ".2%",
+    "fitted": ".2%", "lost": ".2%", "wrong": "d", "outside": "d", "hidden": "d", "kept": ".2%", "rms px": ".4f",
+    "repaired rms px": ".3f", "z": ".2f", "median z": ".2f", "beyond": ".2%", "ms": ".1f", "ratio": ".2f",
+    "reason": TEXT,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -153,40 +148,21 @@ def failure_lines(rows: list[ConditionRow]) -> list[str]:
     return [line for _, _, line in sorted(found)]
 
 
-HEAD = (
-    f"{'condition':<38}{'prom.':>6}{'visible':>8}{'meas.%':>8}{'rep.%':>7}{'fit.%':>7}{'lost%':>7}{'wrong':>7}"
-    f"{'outs.':>6}{'hidden':>7}{'kept%':>8}{'rms px':>9}{'rep.rms':>9}{'z':>7}{'med.z':>7}"
-    f"{'bey.%':>8}{'ms':>8}{'ratio':>7}  reason"
-)
-
-
-def results_table(rows: list[ConditionRow]) -> str:
-    """The table of all rows, with headings by group."""
-    lines, group = [HEAD], ""
-    for row in rows:
-        if row.group != group:
-            group = row.group
-            lines.append(f"-- {group}")
-        lines.append(_row_line(row))
-    return "\n".join(lines)
-
-
-def _row_line(row: ConditionRow) -> str:
-    shares = "".join(
-        f"{100 * row.share(name):>{width}.2f}"
-        for name, width in (("measured", 8), ("repaired", 7), ("fitted", 7), ("lost", 7))
-    )
-    return (
-        f"{row.condition:<38}{row.promised:>6}{row.visible:>8}{shares}{row.wrong:>7}{row.outside:>6}{row.hidden:>7}"
-        f"{_or_dash(100 * row.kept_share, 8, 2)}{_or_dash(row.rms_px, 9, 4)}{_or_dash(row.repaired_rms_px, 9, 3)}"
-        f"{_or_dash(row.calibration.z.value, 7, 2)}{_or_dash(row.calibration.median_z, 7, 2)}"
-        f"{_or_dash(100 * row.calibration.beyond.value, 8, 2)}"
-        f"{_or_dash(row.ms, 8, 1)}{_or_dash(row.ratio, 7, 2)}  {row.reasons}"
-    )
-
-
-def _or_dash(value: float, width: int, digits: int) -> str:
-    return f"{value:>{width}.{digits}f}" if math.isfinite(value) else f"{'-':>{width}}"
+def results_table(rows: Sequence[ConditionRow]) -> Table:
+    """The table of all rows."""
+    shares = ("measured", "repaired", "fitted", "lost")
+    return Table(
+        "conditions",
+        COLUMNS,
+        [
+            (
+                row.condition, row.group, row.promised, row.visible, *(row.share(name) for name in shares), row.wrong,
+                row.outside, row.hidden, row.kept_share, row.rms_px, row.repaired_rms_px, row.calibration.z.value,
+                row.calibration.median_z, row.calibration.beyond.value, row.ms, row.ratio, row.reasons,
+            )
+            for row in rows
+        ],
+    )  # fmt: skip
 
 
 def result_line(result: CaseResult) -> str:
@@ -218,64 +194,3 @@ def summary_text(rows: list[ConditionRow]) -> str:
         f"promise (99 % measured or repaired) held in {kept_promises} of {len(promised)} conditions, "
         f"{100 * total['kept'] / max(total['sure'], 1):.2f} % together; slower than {SLOWEST_RATIO} x plain: {slow}"
     )
-
-
-def calibration_table(results: Sequence[CaseResult]) -> str:
-    """Errors over covariances, pooled over all images, by how positions were found."""
-    lines = calibration_lines("all images", [result.squares for result in results])
-    return "\n".join([calibration_head("errors over covariances"), *lines])
-
-
-def write_json(rows: list[ConditionRow], path: Path) -> None:
-    """Write every row as an object, NaN as null."""
-    columns = [null_for_nan(asdict(row)) for row in rows]
-    write_file(path, json.dumps(columns, indent=1) + "\n")
-
-
-def plot_conditions(rows: list[ConditionRow], kinds: Sequence[ConditionKind], path: Path) -> None:
-    """Plot one panel per kind, one bar per step: shares of the visible markers; wrong ones in red, with their count."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    shown = [kind for kind in kinds if any(_is_of_kind(row, kind) for row in rows)]
-    across = 9
-    down = math.ceil(len(shown) / across)
-    figure, axes = pyplot.subplots(down, across, figsize=(2.1 * across, 1.75 * down), squeeze=False)
-    for panel in axes.ravel()[len(shown) :]:
-        panel.set_visible(False)
-    for kind, panel in zip(shown, axes.ravel(), strict=False):
-        _draw_panel(panel, kind, [row for row in rows if _is_of_kind(row, kind)])
-    handles = [matplotlib.patches.Patch(color=color, label=name) for name, color in COLORS.items()]
-    figure.legend(handles=handles, loc="upper center", ncols=len(handles), frameon=False)
-    figure.tight_layout(rect=(0, 0, 1, 0.98))
-    with staged_file(path) as staged:
-        figure.savefig(
-            staged,
-            format=path.suffix[1:] or "png",
-            dpi=110,
-            metadata={"Software": None} if path.suffix == ".png" else None,
-        )
-    pyplot.close(figure)
-
-
-def _is_of_kind(row: ConditionRow, kind: ConditionKind) -> bool:
-    return row.condition.rpartition("=")[0] == kind.name
-
-
-def _draw_panel(panel: Any, kind: ConditionKind, rows: list[ConditionRow]) -> None:
-    bottom = np.zeros(len(rows))
-    for name in ("measured", "repaired", "fitted", "lost"):
-        share = np.array([row.share(name) for row in rows])
-        panel.bar(range(len(rows)), share, bottom=bottom, color=COLORS[name], width=0.85)
-        bottom += share
-    for place, row in enumerate(rows):
-        if row.wrong:
-            panel.bar(place, max(min(row.share("wrong"), 1.0), 0.04), color=COLORS["wrong"], width=0.85)
-            panel.text(place, 0.5, str(row.wrong), ha="center", va="center", fontsize=7, weight="bold")
-    panel.set_title(kind.name, fontsize=7, pad=2)
-    panel.set_xticks(range(len(rows)), [row.condition.rpartition("=")[2] for row in rows], fontsize=6)
-    panel.set_xlabel(kind.unit, fontsize=6, labelpad=1)
-    panel.set_ylim(0, 1)
-    panel.set_yticks([])

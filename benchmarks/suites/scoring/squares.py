@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.scoring.calibration import Calibration, calibration_line, squared_distances, summarise
+from benchmarks.suites.scoring.calibration import Calibration, squared_distances, summarise
 from extractor import Markers, Status, VirtualStatus
 
 MEASURED, VIRTUAL_MEASURED = "measured", "virtual, measured"
@@ -62,11 +62,3 @@ def calibrations_by_position(pictures: Sequence[PictureSquares]) -> dict[str, Ca
         name: summarise([squares[name] for squares in pictures if name in squares]) for name in POSITIONS
     }
     return {name: calibration for name, calibration in found.items() if calibration.count}
-
-
-def calibration_lines(name: str, pictures: Sequence[PictureSquares]) -> list[str]:
-    """One line of ``calibration_line`` per entry of ``POSITIONS`` that the pictures have."""
-    return [
-        calibration_line(f"{name}: {position}", calibration)
-        for position, calibration in calibrations_by_position(pictures).items()
-    ]

@@ -104,15 +104,12 @@ class Instrument:
 
     def read(self, image: NDArray[Any]) -> tuple[Markers, ...]:
         """The markers view by view, in the frame of the whole image."""
-        from extractor.space.reconstruction import translate_markers
         from extractor.space.views import crop_to_view
 
         found = []
         for view, read in zip(self.sensor.rig.views, self._readers, strict=True):
             origin = view.area_px[:2] if view.area_px else (0, 0)
-            found.append(
-                translate_markers(read(crop_to_view(image, view)), (float(origin[0]), float(origin[1])))
-            )
+            found.append(read(crop_to_view(image, view)).moved((float(origin[0]), float(origin[1]))))
         return tuple(found)
 
     @cached_property

@@ -14,6 +14,7 @@ from cmpdesign.documents.document import Document
 from cmpdesign.documents.runs import ReconstructDocument, TrackDocument
 from cmpdesign.errors import CmpDesignError, OutputError, parameter
 from cmpdesign.inputs.texts import visible
+from cmpdesign.tracking.jobs.force_readers import contact_reader, contact_tracker
 from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions, TrackOptions
 from cmpdesign.tracking.live.options import Live
 from cmpdesign.tracking.recording.options import Recording
@@ -23,8 +24,7 @@ if TYPE_CHECKING:
     from cmpdesign.contact.elastomer import Elastomer
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.sources import Reading
-    from extractor import ContactTracker, Markers, Reference, Tracker
-    from extractor.contact import ContactReader
+    from extractor import ContactTracker, Reference, Tracker
 
 Summary = TypeVar("Summary", bound=Document, covariant=True)
 
@@ -138,8 +138,8 @@ class TrackJob:
         if (gel is None) != (rig is None):
             raise CmpDesignError(f"{parameter('contact')} and {parameter('rig')} need each other; give both")
         if gel is not None and rig is not None:
-            contact = _contact_reader(gel, rig, self.layout)
-            tracker = _contact_tracker(plain, rig, contact, at_rest)
+            contact = contact_reader(gel, rig, self.layout)
+            tracker = contact_tracker(plain, rig, contact, at_rest)
         frames = open_source(source, reading)
         video = None
         if self.overlay is not None:
@@ -216,7 +216,7 @@ class ReconstructJob:
         )
         continuation = None if elastomer is None else _continuation(elastomer, views.layout)
         gel = _path(how["contact"])
-        contact = None if gel is None else _contact_reader(gel, self.rig, views.layout)
+        contact = None if gel is None else contact_reader(gel, self.rig, views.layout)
         source = open_sources(self.source, reading_of(how))
         is_one_a_view = len(split_list(self.source)) > 1
         recording = replace(recording_of(how), views=rig.views, is_image_one_a_view=is_one_a_view)
@@ -332,35 +332,6 @@ def _continuation(elastomer: Elastomer, layout: Reference) -> SurfaceContinuatio
 
     edges_mm = np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0]
     return SurfaceContinuation(elastomer, layout.xy_mm, float(np.median(np.hypot(*edges_mm.T))))
-
-
-def _contact_reader(gel: Path, rig: Path, layout: Reference) -> ContactReader:
-    from cmpdesign.tracking.marker_depth import read_force_constants
-    from extractor.contact import ContactReader, load_gel
-
-    scale = read_force_constants(rig)
-    return ContactReader(
-        layout,
-        load_gel(gel),
-        scale.young_mpa,
-        young_sigma_mpa=scale.young_sigma_mpa,
-        friction=scale.friction,
-    )
-
-
-def _contact_tracker(
-    tracker: Tracker, rig: Path, contact: ContactReader, rest: Markers | None
-) -> ContactTracker:
-    """A tracker of the rig's only view that also reads forces."""
-    from extractor import ContactTracker, load_rig
-
-    views = load_rig(rig).views
-    if len(views) != 1 or views[0].area_px is not None:
-        raise CmpDesignError(
-            f"{rig} has {len(views)} views; force from one camera needs one [[view]] of the whole image: take "
-            "reconstruct for several views"
-        )
-    return ContactTracker(tracker, views[0], contact, rest)
 
 
 def _path(given: str | Path | None) -> Path | None:

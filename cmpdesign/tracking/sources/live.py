@@ -26,8 +26,9 @@ class LiveClock:
     """Times of a live source's frames, s from the first one: the camera's time stamps, or times of arrival.
 
     A stamp is used where it is later than the previous frame, and not long before the arrival; some drivers give no
-    stamps. A frame cannot arrive before it is taken: the least delay so far is the camera's clock against ours. Stamps
-    that run ahead of it by ``MOST_LEAD_S`` are no clock, and times are those of arrival from then on.
+    stamps. Stamps shortly before their arrival are on our clock, as Linux has them. Of others the least delay so far is
+    the camera's clock against ours, as a frame cannot arrive before it is taken. Stamps that run ahead of it by
+    ``MOST_LEAD_S`` are no clock, and times are those of arrival from then on.
     """
 
     def __init__(self) -> None:
@@ -41,11 +42,10 @@ class LiveClock:
     def time_s(self, stamp_s: float, now_s: float) -> float:
         """The time of a frame; ``stamp_s``: on the camera's clock, NaN without an image; ``now_s``: of its arrival."""
         if self._start_s is None:
-            self._start_s = now_s
-            began_s = time.time()
-            self.times = replace(
-                self.times, began_unix_s=began_s, began_of="clock", origin=("arrival", now_s)
-            )
+            self._start_s = stamp_s if 0 <= now_s - stamp_s < MOST_DELAY_S else now_s
+            began_s = time.time() - (now_s - self._start_s)
+            origin = ("arrival", self._start_s)
+            self.times = replace(self.times, began_unix_s=began_s, began_of="clock", origin=origin)
         time_s = now_s - self._start_s
         if self._has_stamps and stamp_s == stamp_s:
             time_s = self._by_stamp_s(stamp_s, time_s)
@@ -54,7 +54,9 @@ class LiveClock:
 
     def _by_stamp_s(self, stamp_s: float, arrival_s: float) -> float:
         if self._offset_s is None:
-            self._offset_s = self._first_offset_s = arrival_s - stamp_s
+            start_s = self._start_s or 0.0
+            is_ours = 0 <= arrival_s + start_s - stamp_s < MOST_DELAY_S
+            self._offset_s = self._first_offset_s = -start_s if is_ours else arrival_s - stamp_s
         self._offset_s = min(self._offset_s, arrival_s - stamp_s)
         if self._first_offset_s - self._offset_s > MOST_LEAD_S:
             self._has_stamps = False

@@ -44,8 +44,9 @@ Array<double, 1> interpolated_edges(View<const double, 1> edge_px, View<const st
 
 // The variance of a lost marker's place by the two rings around it, px^2; NaN where the place is not safe.
 //
-// What the neighbours' noise does not explain of their misfit is the surface's departure from the map.
-double variance_by_neighbours(Index m, const MarkerPredictions& rings, double edge_px,
+// What the neighbours' noise does not explain of their misfit is the surface's departure from the map; seen
+// is the same as predictions of measured markers around show it, px^2.
+double variance_by_neighbours(Index m, const MarkerPredictions& rings, double seen, double edge_px,
                               const RepairLimits& limits) {
   const double variance = rings.variance_px2[m], leverage = rings.leverage[m];
   const double upper_bound = variance * (1 + leverage) + square(limits.model_deviation * edge_px);
@@ -53,15 +54,29 @@ double variance_by_neighbours(Index m, const MarkerPredictions& rings, double ed
       !(leverage < limits.max_leverage && upper_bound < square(limits.max_repaired_deviation * edge_px)))
     return NOT_A_NUMBER;
   const double departure = std::max(variance - rings.neighbour_noise_px2[m], 0.0);
-  return rings.noise_px2[m] + square(limits.mild_error * leverage) * departure;
+  const double found =
+      rings.noise_px2[m] + std::max(square(limits.mild_error * leverage) * departure, seen * (1 + leverage));
+  return found < square(limits.max_repaired_deviation * edge_px) ? found : NOT_A_NUMBER;
 }
 
+// A sum of departures from predictions, px^2, and their number.
+struct Departures {
+  double sum = 0.0, count = 0.0;
+
+  void add(const Departures& other, double weight = 1.0) {
+    sum += weight * other.sum;
+    count += weight * other.count;
+  }
+};
+
 // The same by the quadratic through the marker's layer, px^2.
-double variance_by_layer(Index m, const LayerPrediction& found, double edge_px, const RepairLimits& limits) {
+double variance_by_layer(Index m, const LayerPrediction& found, double seen, double edge_px,
+                         const RepairLimits& limits) {
   if (!(found.misfit_px2[m] + square(limits.fitted_model_sigmas * limits.model_deviation * edge_px) <
         square(limits.max_fitted_deviation * edge_px)))
     return NOT_A_NUMBER;
-  return found.variance_px2[m];
+  const double variance = found.variance_px2[m] + seen;
+  return variance < square(limits.max_repaired_deviation * edge_px) ? variance : NOT_A_NUMBER;
 }
 
 // M markers before repair.
@@ -75,11 +90,12 @@ struct UnrepairedMarkers {
 // The repair of the lost markers and the fusion of the uncertain ones.
 class Repair {
  public:
-  Repair(const UnrepairedMarkers& markers, const RingTables& tables, const ImageSize& size,
-         const RepairLimits& limits)
+  Repair(const UnrepairedMarkers& markers, const RefinedMarkers& refined, const RingTables& tables,
+         const ImageSize& size, const RepairLimits& limits)
       : xy_(markers.xy_px),
         cov_(markers.cov_px2),
         markers_(markers),
+        refined_(refined),
         tables_(tables),
         size_(size),
         limits_(limits),
@@ -98,19 +114,58 @@ class Repair {
       wanted[m] = lost_[m] || uncertain;
       if (uncertain) known_[m].fill(NOT_A_NUMBER);
     }
-    fill_by_rings(predictions(wanted), wanted);
+    fill_by_rings(wanted);
     add_fused_markers();
-    if (is_any(lost_) && is_any(Flags(markers_.uncertain))) fill_lost_by_rings(predictions(lost_));
+    if (is_any(lost_) && is_any(Flags(markers_.uncertain))) fill_by_rings(Flags(lost_.view()));
     if (is_any(lost_)) fill_by_layer();
     drop_outside();
     return std::move(status_);
   }
 
  private:
-  // by two rings, NaN where unknown
-  MarkerPredictions predictions(View<const bool, 1> wanted) const {
-    return localmap::predict_markers(known_, noise_px2(), wanted, tables_.marker_mm, tables_.neighbours,
+  // by two rings, of the wanted markers and of those around, NaN where unknown
+  MarkerPredictions predictions(const Flags& wanted) const {
+    Flags predicted(wanted.view());
+    for (Index m = 0; m < count_; ++m) {
+      if (!wanted[m]) continue;
+      for (const Index n : tables_.neighbours[m])
+        if (n >= 0) predicted[n] = true;
+    }
+    return localmap::predict_markers(known_, noise_px2(), predicted, tables_.marker_mm, tables_.neighbours,
                                      limits_.maps);
+  }
+
+  // The departure of a marker from its prediction beyond the noise of both; nothing where the marker is
+  // uncertain, not measured or not explained. A measurement that was dropped counts, too.
+  Departures departure_of(Index m, const MarkerPredictions& rings) const {
+    const auto xy = refined_.xy_px[m];
+    const auto cov = refined_.cov_px2[m];
+    if (!refined_.explained[m] || markers_.uncertain[m] || !std::isfinite(xy[0] + rings.xy_px(m, 0)))
+      return {};
+    const double squares = square(xy[0] - rings.xy_px(m, 0)) + square(xy[1] - rings.xy_px(m, 1));
+    const double noise = 0.5 * (cov(0, 0) + cov(1, 1)) + rings.noise_px2[m];
+    return {(0.5 * squares - noise) / (1 + rings.leverage[m]), 1.0};
+  }
+
+  // (M,) px^2, the variance of departures around the wanted markers, which count beside those of the picture
+  Array<double, 1> seen_departures(const MarkerPredictions& rings, const Flags& wanted) const {
+    Array<Departures, 1> each({count_});
+    Departures picture;
+    for (Index m = 0; m < count_; ++m) {
+      each[m] = departure_of(m, rings);
+      if (!lost_[m]) picture.add(each[m]);
+    }
+    const double mean = picture.count > 0.0 ? std::max(picture.sum / picture.count, 0.0) : 0.0;
+    Array<double, 1> seen({count_}, 0.0);
+    for (Index m = 0; m < count_; ++m) {
+      if (!wanted[m]) continue;
+      Departures around{limits_.picture_departures * mean, limits_.picture_departures};
+      if (lost_[m]) around.add(each[m], limits_.own_departures);
+      for (const Index n : tables_.neighbours[m])
+        if (n >= 0) around.add(each[n]);
+      seen[m] = std::max(around.sum / around.count, 0.0);
+    }
+    return seen;
   }
 
   // (M,) the markers' variances per axis, NaN where unknown
@@ -130,10 +185,12 @@ class Repair {
     return variance >= 0.0 && is_inside_image(place[0], place[1], size_);
   }
 
-  void fill_by_rings(const MarkerPredictions& rings, const Flags& wanted) {
+  void fill_by_rings(const Flags& wanted) {
+    const MarkerPredictions rings = predictions(wanted);
+    const Array<double, 1> seen = seen_departures(rings, wanted);
     for (Index m = 0; m < count_; ++m) {
       if (!wanted[m]) continue;
-      const double variance = variance_by_neighbours(m, rings, edge_px_[m], limits_);
+      const double variance = variance_by_neighbours(m, rings, seen[m], edge_px_[m], limits_);
       const auto place = rings.xy_px[m];
       if (lost_[m]) {
         lost_[m] = !fill(m, place, variance);
@@ -141,14 +198,6 @@ class Repair {
       } else if (variance >= 0.0) {
         update_by_fusion(xy_[m], cov_[m], place, variance);
       }
-    }
-  }
-
-  // again, from uncertain markers, too
-  void fill_lost_by_rings(const MarkerPredictions& rings) {
-    for (Index m = 0; m < count_; ++m) {
-      if (lost_[m])
-        lost_[m] = !fill(m, rings.xy_px[m], variance_by_neighbours(m, rings, edge_px_[m], limits_));
     }
   }
 
@@ -163,10 +212,11 @@ class Repair {
   // the weakest and slowest prediction, only for the remaining markers
   void fill_by_layer() {
     const LayerPrediction found = predict_by_layer(known_, noise_px2(), tables_.layers, limits_.layers);
+    const Array<double, 1> seen = seen_departures(predictions(lost_), lost_);
     for (Index m = 0; m < count_; ++m) {
       if (!lost_[m]) continue;
       status_[m] = FITTED;
-      fill(m, found.xy_px[m], variance_by_layer(m, found, edge_px_[m], limits_));
+      fill(m, found.xy_px[m], variance_by_layer(m, found, seen[m], edge_px_[m], limits_));
     }
   }
 
@@ -182,6 +232,7 @@ class Repair {
   View<double, 2> xy_;
   View<double, 3> cov_;
   const UnrepairedMarkers& markers_;
+  const RefinedMarkers& refined_;  // before any was dropped
   const RingTables& tables_;
   const ImageSize& size_;
   const RepairLimits& limits_;
@@ -206,7 +257,7 @@ RepairedMarkers repair_markers(const RefinedMarkers& refined, const refine::Star
   if (is_complete && !is_any) {
     for (Index m = 0; m < xy.size(); ++m) status[m] = std::isfinite(xy(m, 0)) ? MEASURED : LOST;
   } else {
-    status = Repair({xy, cov, uncertain, edge_px}, tables, size, limits).run();
+    status = Repair({xy, cov, uncertain, edge_px}, refined, tables, size, limits).run();
   }
   return {std::move(xy), std::move(cov), std::move(status)};
 }

@@ -19,7 +19,7 @@ struct RepairLimits {
   std::int64_t mild_support;
   double max_repaired_deviation, max_fitted_deviation, max_leverage;
   double model_deviation, fitted_model_sigmas;
-  double mild_error;
+  double mild_error, picture_departures, own_departures;
   LayerLimits layers;
   layout::NeighbourMapLimits maps;
   ConsistencyLimits consistency;
@@ -34,6 +34,8 @@ struct RepairLimits {
             f["model_deviation"],
             f["fitted_model_sigmas"],
             f["mild_error"],
+            f["picture_departures"],
+            f["own_departures"],
             f["layers"],
             f["maps"],
             f["consistency"],

@@ -31,11 +31,14 @@ double median(Values values) {
 
 double length(double x, double y) { return std::sqrt(x * x + y * y); }
 
-// The gridlines of four measured markers, and the lengths of all measured edges; a jump is a third of the
-// third difference.
+// The gridlines of four markers that are measured with certainty, and the lengths of all measured edges; a
+// jump is a third of the third difference.
 std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::Topology& topology,
-                                   double most_of_layout, std::vector<double>& lengths) {
+                                   const JumpLimits& limits, std::vector<double>& lengths) {
   const auto is_measured = [&](Index m) { return m >= 0 && markers.status[m] == MEASURED; };
+  const auto is_certain = [&](Index m, double most) {
+    return is_measured(m) && markers.cov_px2(m, 0, 0) + markers.cov_px2(m, 1, 1) < 2.0 * most * most;
+  };
   std::vector<Gridline> found;
   double uu = 0, uv = 0, vv = 0;
   Vector by_u{}, by_v{};
@@ -44,10 +47,13 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
     if (!is_measured(a) || !is_measured(b)) continue;
     Gridline line{e, {}, {}, {}};
     for (int k = 0; k < 2; ++k) line.rise[k] = markers.xy_px(b, k) - markers.xy_px(a, k);
-    lengths.push_back(length(line.rise[0], line.rise[1]));
+    const double edge_px = length(line.rise[0], line.rise[1]), most = limits.max_deviation * edge_px;
+    lengths.push_back(edge_px);
     const Index before = topology.next_markers(e, 0), after = topology.next_markers(e, 1);
     const double own = length(topology.third_differences(e, 0), topology.third_differences(e, 1));
-    if (!is_measured(before) || !is_measured(after) || own >= 3 * most_of_layout) continue;
+    if (own >= 3 * limits.most_of_layout) continue;
+    if (!is_certain(before, most) || !is_certain(a, most) || !is_certain(b, most) || !is_certain(after, most))
+      continue;
     const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
     uu += u * u, uv += u * v, vv += v * v;
     for (int k = 0; k < 2; ++k) {
@@ -85,9 +91,7 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
     const auto strip = static_cast<std::size_t>(line.middle[axis] / (limits.bin * edge));
     if (strip >= end.size()) end.resize(strip + 1);
     ++end[strip];
-    const auto jump = [&](int k) {
-      return std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge);
-    };
+    const auto jump = [&](int k) { return std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge); };
     crossings.push_back({strip, {jump(0), jump(1)}});
   }
   std::partial_sum(end.begin(), end.end(), end.begin());
@@ -112,7 +116,7 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
 StripJumps measure_jumps(const LocatedMarkers& markers, const layout::Topology& topology,
                          const JumpLimits& limits) {
   std::vector<double> lengths;
-  const auto lines = gridlines_of(markers, topology, limits.most_of_layout, lengths);
+  const auto lines = gridlines_of(markers, topology, limits, lengths);
   if (static_cast<Index>(lengths.size()) < limits.min_gridlines)
     return {0.0, Array<double, 1>({0}), Array<double, 1>({0})};
   const double edge = median(lengths);

@@ -7,12 +7,12 @@ namespace cmp::complete {
 
 // Limits of jumps; explained in extractor/complete/row_breaks.py.
 struct JumpLimits {
-  double bin, most_of_layout, min_rise;
+  double bin, most_of_layout, min_rise, max_deviation;
   std::int64_t min_gridlines;
 
   template <class F>
   static JumpLimits read(const F& f) {
-    return {f["bin"], f["most_of_layout"], f["min_rise"], f["min_gridlines"]};
+    return {f["bin"], f["most_of_layout"], f["min_rise"], f["max_deviation"], f["min_gridlines"]};
   }
 };
 

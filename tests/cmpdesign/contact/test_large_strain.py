@@ -9,8 +9,8 @@ import pytest
 import skfem
 from numpy.typing import NDArray
 
+from benchmarks.large_strain.__main__ import compare
 from benchmarks.large_strain.neo_hookean import NeoHookeanLayer
-from benchmarks.large_strain.run import compare
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.elastic_layer.green import green_kernels
 from cmpdesign.contact.elastic_layer.operator import ComplianceOperator

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.support.scanlines import ImageWindow, fit_edge_offsets, measure_render_error, reference_image
+from benchmarks.suites.scanlines import ImageWindow, fit_edge_offsets, measure_render_error, reference_image
 from cmpdesign.scene import (
     Camera,
     Dent,

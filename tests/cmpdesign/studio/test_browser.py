@@ -17,7 +17,7 @@ import pytest
 
 import cmpdesign
 from cmpdesign.products.drawing.svg import layout_to_svg
-from docs.figures.screens import FLAGS, browser, chromium, served
+from tools.figures.screens import FLAGS, browser, chromium, served
 
 pytestmark = [
     pytest.mark.slow,

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.pad_codes.families import coded_layout, partial_view, told_apart
+from benchmarks.pad_codes.families import VIEWS, coded_layout, partial_view, told_apart
 from extractor import Extractor, LayoutError, Reason, Reference
 
 LAYERS, CODES = 10, (1, 2, 3, 4)
@@ -60,14 +60,17 @@ def test_layouts_that_are_no_family_are_refused() -> None:
         ([reference(1), reference(2, 9)], "layouts 1 and 2 differ in markers"),
         ([reference(1), reference(1)], "2 of 2 layouts have the code 1"),
         ([reference(1), reference(0)], "1 of 2 layouts have no code"),
-        ([reference(1), replace(reference(2), palette={**reference(2).palette, "red": "#aa0000"})], "palette"),
+        (
+            [reference(1), replace(reference(2), palette={**reference(2).palette, "red": "#aa0000"})],
+            "palette",
+        ),
     ):
         with pytest.raises(LayoutError, match=words):
             Extractor(others)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("pads", "share"), [(64, 1.0), (64, 0.5), (4, 1 / 3)])
+@pytest.mark.parametrize(("pads", "share"), VIEWS)
 def test_pads_are_told_apart_and_others_refused(pads: int, share: float) -> None:
     own, foreign = told_apart(LAYERS, pads, share, 64, 77)
     assert own["wrong"] == foreign["wrong"] == foreign["right"] == 0

@@ -54,6 +54,29 @@ def frame(seed: int, true: np.ndarray = TRUE, sigma_px: float = 0.02) -> list[Ma
     return [noisy(LAYOUT, view, true, rng, sigma_px) for view in pair(mirrored=(True, False))]
 
 
+def test_a_point_is_where_the_pixels_are_most_likely() -> None:
+    """By OpenCV's projection with derivatives by differences, which share nothing with the loop."""
+    rng = np.random.default_rng(5)
+    views = (*pair(), looking("above", tilt_deg=25, azimuth_deg=90))
+    half = rng.normal(size=(3, 4, 2, 2)) * 0.02
+    cov = half @ np.swapaxes(half, 2, 3) + 1e-4 * np.eye(2)
+    true = TRUE[[0, 7, 30, 60]]
+    xy = np.stack([opencv_px(view, true) for view in views]) + rng.normal(size=(3, 4, 2)) * 0.01
+    points = triangulate(views, xy, cov)
+    step = 1e-4 * np.eye(3)
+    for k, found in enumerate(points.xyz_mm):
+        information, gradient = np.zeros((3, 3)), np.zeros(3)
+        for v, view in enumerate(views):
+            moved = opencv_px(view, np.concatenate([found + step, found - step, found[None]]))
+            slopes = (moved[:3] - moved[3:6]).T / 2e-4
+            weight = np.linalg.inv(cov[v, k])
+            information += slopes.T @ weight @ slopes
+            gradient += slopes.T @ weight @ (xy[v, k] - moved[6])
+        expected = np.linalg.inv(information)
+        assert np.sqrt(gradient @ expected @ gradient) < 1e-3  # standard deviations from the top
+        np.testing.assert_allclose(points.cov_mm2[k], expected, rtol=1e-5, atol=1e-7 * expected.max())
+
+
 @pytest.mark.parametrize("count", [2, 3])
 def test_the_covariance_is_what_errors_are(count: int) -> None:
     """Normalised RMS near 1 means two things: errors reach the bound of these pixels, and the covariance says so."""

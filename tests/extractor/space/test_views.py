@@ -185,9 +185,9 @@ def test_the_benchmark_runs_and_its_figures_hold(tmp_path: Path) -> None:
     root = Path(__file__).parents[3]
     run = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=600, check=False)
     assert run.returncode == 0, run.stderr
-    results = json.loads(out.read_text(encoding="utf-8"))["results"]
-    assert len({(r["sensor"], r["state"]) for r in results}) == 16
-    for r in results:
-        assert r["reported_share"] > 0.95 and r["normalised"] < 4
+    tables = json.loads(out.read_text(encoding="utf-8"))["tables"].values()
+    assert [len(rows) for rows in tables] == [8, 8]
+    for r in (row for rows in tables for row in rows):
+        assert r["reported"] > 0.95 and r["err/cov"] < 4
         if r["state"] in ("at rest", "ball 20 mm: press 0.5 mm"):
-            assert r["ratio_stated"] < 1.5 and r["ratio_image"] < 1.7 and 0.8 < r["normalised"] < 1.3
+            assert r["err/stated"] < 1.5 and r["err/image"] < 1.7 and 0.8 < r["err/cov"] < 1.3

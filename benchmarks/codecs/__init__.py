@@ -1,1 +1,0 @@
-"""``python -m benchmarks.codecs``: errors of markers by the compression of video."""

@@ -1,1 +1,0 @@
-"""Speed against error: the extractor's presets, other detectors and the article's corners on the same scenes."""

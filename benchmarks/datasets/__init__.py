@@ -1,1 +1,0 @@
-"""Speed and size of data sets."""

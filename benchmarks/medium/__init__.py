@@ -1,1 +1,0 @@
-"""``python -m benchmarks.medium``: depth through a window and a gel."""

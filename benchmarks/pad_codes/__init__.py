@@ -1,1 +1,0 @@
-"""Parts of coded pads, registered by their cells and bits."""

@@ -1,1 +1,0 @@
-"""What each step of a sensor's calibration gains in depth."""

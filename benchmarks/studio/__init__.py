@@ -1,1 +1,0 @@
-"""The times of the studio's page: ``python -m benchmarks.studio``."""

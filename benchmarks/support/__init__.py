@@ -1,1 +1,0 @@
-"""Shared modules of the benchmarks: the machine, scenes, scan lines, published figures."""

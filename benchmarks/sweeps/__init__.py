@@ -1,1 +1,0 @@
-"""``python -m benchmarks.sweeps``: steps of light that are refused between two that are read."""

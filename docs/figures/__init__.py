@@ -1,4 +1,0 @@
-"""Every picture and generated page of the documentation, drawn by the project's own code.
-
-``python -m docs.figures`` writes them again; ``tests/docs/test_docs.py`` compares them with what is committed.
-"""

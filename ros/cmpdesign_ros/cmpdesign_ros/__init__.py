@@ -1,0 +1,1 @@
+"""Tactile sensors as a ROS 2 node."""

@@ -1,0 +1,251 @@
+"""Running sensors: cameras with known exposure times stand in the place of OpenCV's, and fail as real ones do."""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import threading
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import cmpdesign
+from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_opencv
+from cmpdesign.runtime.events import EventKind
+from cmpdesign.runtime.pairing import nearest_places
+from cmpdesign.runtime.sensor import LateError
+from cmpdesign.runtime.zero import TouchedError
+from cmpdesign.scene import Press
+from cmpdesign.sensor.tables import SensorError
+from extractor import FrameStatus
+from tests.support.layouts import small_text
+from tests.support.tracking.press import write_press
+from tests.support.tracking.scenes import LAYERS, errors, moving, shot
+
+FPS = 20.0
+SENSOR = """\
+layout = "layout.json"
+[[view]]
+name = "camera"
+focal_px = [500.0, 500.0]
+centre_px = [159.5, 119.5]
+[camera]
+source = "{source}"
+fps = 20.0
+"""
+Plug = Callable[..., dict[int, TimedCamera]]
+
+
+@pytest.fixture(scope="module")
+def shots() -> list[Any]:
+    return list(moving(6))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "layout.json").write_text(small_text("honeycomb", LAYERS), encoding="utf-8")
+    for number, name in enumerate(("thumb", "index")):
+        (tmp_path / f"{name}.toml").write_text(SENSOR.format(source=number))
+    return tmp_path
+
+
+@pytest.fixture
+def plug(monkeypatch: pytest.MonkeyPatch) -> Plug:
+    def in_place(*cameras: TimedCamera) -> dict[int, TimedCamera]:
+        numbered = dict(enumerate(cameras))
+        monkeypatch.setattr(cv2, "VideoCapture", in_the_place_of_opencv(numbered))
+        return numbered
+
+    return in_place
+
+
+def opened(*paths: Path) -> Any:
+    return cmpdesign.open_sensor(*paths)
+
+
+def after(sensor: Any, kind: EventKind, within_s: float = 3.0) -> Any:
+    """The first event of a kind, waited for."""
+    end_s = time.monotonic() + within_s
+    while time.monotonic() < end_s:
+        if found := [one for one in sensor.events if one.kind is kind]:
+            return found[0]
+        time.sleep(0.005)
+    raise AssertionError(f"no {kind} in {sensor.events}")
+
+
+def test_the_newest_frame_with_its_time(folder: Path, plug: Plug, shots: list[Any]) -> None:
+    (camera,) = plug(TimedCamera([one.image for one in shots], FPS)).values()
+    with opened(folder / "thumb.toml") as sensors:
+        frame = sensors.thumb.wait()
+        for _ in range(5):
+            last, frame = frame, sensors.thumb.wait(after=frame.index, timeout_s=1.0)
+            assert frame.index > last.index
+            number = (frame.taken_s + 0.002 - camera.began_s) * FPS  # 4 ms of exposure, stamped at its end
+            assert number == pytest.approx(round(number), abs=1e-3)
+            assert errors(frame.markers.xy_px, shots[round(number) % len(shots)]).max() < 0.2
+        assert frame.latency_ms < frame.age_ms < 1e3 and abs(frame.taken_unix_s - time.time()) < 0.5
+        assert frame.shape is None and frame.contact is None and frame.events == ()
+        copy = pickle.loads(pickle.dumps(frame))
+        assert np.array_equal(copy.markers.xy_px, frame.markers.xy_px, equal_nan=True)
+        for one, other in pairwise(sensors.thumb.results):
+            assert other.index - one.index == other.dropped + 1
+        health = sensors.thumb.health
+        assert 0 < health.frames_per_s < 1.5 * FPS and health.share_read > 0.9
+        assert health.latency_ms[0] <= health.latency_ms[2] and health.qualities[0].blur_px > 0.5
+    with pytest.raises(LateError, match="thumb: no result after"):
+        sensors.thumb.wait(after=frame.index + 1000, timeout_s=0.01)
+
+
+def test_dropped_frames_are_counted(folder: Path, plug: Plug, shots: list[Any]) -> None:
+    """A camera that is much faster than the reader: every frame has a result, or is counted."""
+    fast = 400.0
+    text = (folder / "thumb.toml").read_text().replace("fps = 20.0", f"fps = {fast}")
+    (folder / "thumb.toml").write_text(text)
+    plug(TimedCamera([one.image for one in shots], fast))
+    with opened(folder / "thumb.toml") as sensors:
+        time.sleep(0.5)
+    frames = sensors.thumb.results
+    assert sum(one.dropped for one in frames) > 10
+    for before, one in pairwise(frames):
+        missing = (one.taken_s - before.taken_s) * fast - 1
+        # the first steps between frames are not known yet
+        assert one.dropped == pytest.approx(missing, abs=0.1) or one.index < 20
+
+
+@pytest.mark.parametrize("kind", ["stall", "unplugged", "small"])
+def test_a_gap_is_reported_within_two_frames_and_ends(
+    kind: str, folder: Path, plug: Plug, shots: list[Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    fps, begin_s = 10.0, 0.75  # slow, so that two frame times are long for this machine
+    camera = TimedCamera([one.image for one in shots], fps, [Fault(kind, begin_s, 1.3)])
+    plug(camera)
+    (folder / "thumb.toml").write_text(
+        (folder / "thumb.toml").read_text().replace("fps = 20.0", "fps = 10.0")
+    )
+    caplog.set_level(logging.INFO, "cmpdesign.runtime")
+    with opened(folder / "thumb.toml") as sensors:
+        first = after(sensors.thumb, EventKind.SILENT if kind == "stall" else EventKind.STOPPED)
+        noticed_s = first.unix_s - time.time() + time.monotonic() - camera.began_s
+        assert noticed_s - int(begin_s * fps) / fps < 2 / fps + 0.15  # for the machine
+        with pytest.raises(LateError, match=r"max_age_ms is 100 \(camera 0: "):
+            while time.monotonic() - camera.began_s < 1.2:
+                sensors.thumb.latest()
+        resumed = after(sensors.thumb, EventKind.RESUMED)
+        assert 500 < resumed.gap_ms < 2000
+        frame = sensors.thumb.wait(after=sensors.thumb.results[-1].index, timeout_s=1.0)
+        assert frame.status == FrameStatus.TRACKED and frame.age_ms < 500
+        told = [event.kind for one in sensors.thumb.results for event in one.events]
+        assert EventKind.RESUMED in told
+    assert (camera.opened > 1) == (kind != "stall")
+    assert "frames again after" in caplog.text
+    if kind == "small":
+        assert "its frames have 160 x 120 px instead of 320 x 240" in str(first)
+
+
+def test_nothing_hangs_on_close(folder: Path, plug: Plug, shots: list[Any]) -> None:
+    """Also while the driver keeps a read, and while the camera is away."""
+    before = threading.active_count()
+    for faults in ((), (Fault("stall", 0.2, 2.0),), (Fault("unplugged", 0.2, 99.0),)):
+        plug(TimedCamera([one.image for one in shots], FPS, faults))
+        with opened(folder / "thumb.toml") as sensors:
+            time.sleep(0.35)
+            began_s = time.monotonic()
+        assert time.monotonic() - began_s < 1.0
+        with pytest.raises(LateError):
+            sensors.thumb.wait(after=10**6)
+    end_s = time.monotonic() + 3
+    while threading.active_count() > before and time.monotonic() < end_s:
+        time.sleep(0.02)
+    assert threading.active_count() == before
+
+
+def test_two_sensors_are_paired_by_time(folder: Path, plug: Plug, shots: list[Any]) -> None:
+    images = [one.image for one in shots]
+    began_s = time.monotonic()
+    plug(TimedCamera(images, FPS, began_s=began_s), TimedCamera(images, FPS, began_s=began_s + 0.01))
+    with opened(folder / "thumb.toml", folder / "index.toml") as sensors:
+        assert [one.name for one in sensors] == ["thumb", "index"]
+        frames = sensors.wait()
+        for _ in range(4):
+            frames = sensors.wait(frames, timeout_s=1.0)
+            offset_ms = 1e3 * (frames.index.taken_s - frames.thumb.taken_s)
+            assert frames.offsets_ms == {"thumb": 0.0, "index": pytest.approx(offset_ms)}
+            grid = (offset_ms - 10) / 50  # of the exposures; on a busy machine frames are dropped
+            assert abs(grid - round(grid)) < 1e-3
+    assert nearest_places([[0.0, 0.05, 0.1], [0.01, 0.06]]) == [1, 1]
+    assert nearest_places([[0.0], []]) is None
+
+
+def test_zero_takes_the_mean_at_rest_and_refuses_a_touched_pattern(folder: Path, plug: Plug) -> None:
+    noisy = [shot(seed=seed).image for seed in range(4)]
+    pressed = [shot(surface=Press(4.0, 0.25), seed=seed).image for seed in range(4)]
+    shown = noisy
+    plug(TimedCamera(lambda number: shown[number % len(shown)], 60.0))
+    with opened(folder / "thumb.toml") as sensors:
+        sensors.thumb.wait()
+        first = sensors.thumb.results[0]
+        assert not np.nan_to_num(first.tracked.displacement_px).any()  # the first frame is at rest
+        sensors.zero()
+        frame = sensors.thumb.wait(after=sensors.thumb.results[-1].index + 1)
+        moved = frame.tracked.displacement_px
+        truth = shot().truth.marker_xy_px
+        rest = frame.markers.xy_px - moved
+        one, mean = (float(np.sqrt(np.nanmean((xy - truth) ** 2))) for xy in (frame.markers.xy_px, rest))
+        assert mean < one and np.nanmax(np.abs(moved)) < 0.2
+        assert sensors.thumb.health.rest_error_px < 0.05
+        shown = pressed
+        time.sleep(0.1)
+        with pytest.raises(TouchedError, match="something touches the pattern"):
+            sensors.zero()
+        assert sensors.thumb.health.rest_error_px > 0.3
+        sensors.zero(check=False)
+        after_zero = sensors.thumb.wait(after=sensors.thumb.results[-1].index + 1)
+        assert np.nanmax(np.abs(after_zero.tracked.displacement_px)) < 0.2
+        shown = [one.image for one in moving(6, speed=8)]
+        time.sleep(0.1)
+        with pytest.raises(TouchedError, match="the markers move by"):
+            sensors.zero()
+
+
+def test_a_surface_of_recorded_views(tmp_path: Path) -> None:
+    """A folder is played at its rate; frames that come while the views are placed are dropped, and counted."""
+    write_press(tmp_path)
+    camera = 'layout = "layout.json"\ncamera.source = "frames"\n'
+    (tmp_path / "hand.toml").write_text(camera + (tmp_path / "rig.toml").read_text())
+    with opened(tmp_path / "hand.toml") as sensors:
+        ended = after(sensors.hand, EventKind.ENDED)
+        last = sensors.hand.wait(after=2)
+        with pytest.raises(LateError, match="the recorded frames are over"):
+            time.sleep(0.15)
+            sensors.hand.latest()
+    assert "frames" in str(ended) and [one.kind for one in sensors.hand.events] == [EventKind.ENDED]
+    assert last.index == 3 and sum(1 + one.dropped for one in sensors.hand.results) == 4
+    truth = np.load(tmp_path / "truth.npy")[3, : len(last.shape.xyz_mm)]
+    assert np.sqrt(np.nanmean((last.shape.xyz_mm - truth) ** 2)) < 0.02 and len(last.markers) == 2
+
+
+WRONG = {
+    ("thumb.toml", "thumb.toml"): "name 'thumb' is used by this file",
+    ("thumb.toml", "other.toml"): "camera '0' is used by",
+    ("none.toml",): r"\[camera\] names no source",
+    ("two.toml",): "names 2 cameras for 1",
+}
+
+
+@pytest.mark.parametrize("names", WRONG, ids=lambda names: names[-1])
+def test_files_that_cannot_be_used(names: tuple[str, ...], folder: Path) -> None:
+    (folder / "other.toml").write_text(SENSOR.format(source=0))
+    (folder / "none.toml").write_text(SENSOR.format(source=""))
+    (folder / "two.toml").write_text(SENSOR.format(source="0,1"))
+    with pytest.raises(SensorError, match=WRONG[names]):
+        cmpdesign.open_sensor(*(folder / name for name in names))
+    with pytest.raises(SensorError, match="shape needs two or more"):
+        cmpdesign.open_sensor(folder / "thumb.toml", outputs=["shape"])
+    with pytest.raises(SensorError, match=r"no output 'shpe' \(did you mean shape"):
+        cmpdesign.open_sensor(folder / "thumb.toml", outputs=["shpe"])
