@@ -49,6 +49,20 @@ class CodeLimits(NamedTuple):
 LIMITS = CodeLimits()
 
 
+class Agreement(NamedTuple):
+    """How well a motion agrees with the bits.
+
+    Attributes:
+        odds: its log odds.
+        known_white: number of the known places that the motion makes white.
+        motions: number of the motions that were compared; 1 where the outline decided.
+    """
+
+    odds: float
+    known_white: int
+    motions: int
+
+
 class CodeBits(NamedTuple):
     """The bits of one part.
 
@@ -76,31 +90,29 @@ class CodeBits(NamedTuple):
         """The share of the known bits that are wrong by a motion with these log odds; outside the layout is black."""
         return (self.white - odds / LIMITS.wrong_bit) / max(self.known, 1)
 
-    def is_other(self, odds: float, known_white: int, motions: int) -> bool:
-        """Whether the bits contradict the layout's code by the best motion; arguments as in ``proves``."""
-        wrong = self.misfit(odds) * self.known
-        agrees = self._log_chance(odds, known_white, motions) <= LIMITS.other_log_chance
-        is_chance = self.known >= LIMITS.other_bits and not agrees
+    def is_other(self, best: Agreement) -> bool:
+        """Whether the bits contradict the layout's code, by the best motion."""
+        wrong = self.misfit(best.odds) * self.known
+        is_chance = self.known >= LIMITS.other_bits and self._log_chance(best) > LIMITS.other_log_chance
         return is_chance or wrong > LIMITS.max_misfit * self.known + LIMITS.lead_bits
 
-    def proves(self, odds: float, known_white: int, motions: int, lead: float) -> bool:
-        """Whether the bits show the layout's code, and no other one, and where by a motion.
+    def proves(self, best: Agreement, lead: float) -> bool:
+        """Whether the bits show the layout's code, and no other one, and where by the best motion.
 
         Args:
-            odds: log odds of the motion.
-            known_white: number of the known places that the motion makes white.
-            motions: number of the motions that were compared; 1 if the outline decided.
+            best: the agreement of this motion.
             lead: log odds over the second best motion.
         """
         leads = lead >= LIMITS.wrong_bit * (LIMITS.lead_bits + LIMITS.lead_share * self.known)
         most = LIMITS.max_log_chance_with_lead if leads else LIMITS.max_log_chance
-        return self.misfit(odds) <= LIMITS.max_misfit and self._log_chance(odds, known_white, motions) <= most
+        return self.misfit(best.odds) <= LIMITS.max_misfit and self._log_chance(best) <= most
 
-    def _log_chance(self, odds: float, known_white: int, motions: int) -> float:
+    def _log_chance(self, best: Agreement) -> float:
         """The logarithm of the expected number of motions by which chance makes as many white places agree."""
-        agreed, black = round((odds / LIMITS.wrong_bit + known_white) / 2), self.known - known_white
+        agreed = round((best.odds / LIMITS.wrong_bit + best.known_white) / 2)
+        black = self.known - best.known_white
         ways = sum(
-            math.comb(known_white, n) * math.comb(black, self.white - n)
-            for n in range(agreed, min(known_white, self.white) + 1)
+            math.comb(best.known_white, n) * math.comb(black, self.white - n)
+            for n in range(agreed, min(best.known_white, self.white) + 1)
         )
-        return math.log(max(motions, 1)) + math.log(ways) - math.log(math.comb(self.known, self.white))
+        return math.log(max(best.motions, 1)) + math.log(ways) - math.log(math.comb(self.known, self.white))

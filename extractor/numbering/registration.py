@@ -21,7 +21,7 @@ from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
-from extractor.numbering.code_bits import CodeBits
+from extractor.numbering.code_bits import Agreement, CodeBits
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
@@ -206,8 +206,7 @@ class PlacedPart(NamedTuple):
     @property
     def is_code(self) -> bool:
         """Whether the best motion, if it is right, shows the code of the layout, if the layout has one."""
-        white, known, _ = self.evidence
-        return self.bits is None or self.bits.proves(white, known, 1, lead=0.0)
+        return self.bits is None or self.bits.proves(self.agreement._replace(motions=1), lead=0.0)
 
     def has_motion_of(self, other: PlacedPart) -> bool:
         """Whether the best motions of both agree."""
@@ -216,13 +215,13 @@ class PlacedPart(NamedTuple):
 
     @property
     def is_proved_by_bits(self) -> bool:
-        return self.bits is not None and self.bits.proves(*self.evidence, self.lead)
+        return self.bits is not None and self.bits.proves(self.agreement, self.lead)
 
     @property
-    def evidence(self) -> tuple[float, int, int]:
-        """Log odds and number of the known white places by the best motion, and the number of motions."""
+    def agreement(self) -> Agreement:
+        """Of the best motion."""
         motions = self.motions
-        return float(motions.white[0]), int(motions.known_white[0]), motions.count
+        return Agreement(float(motions.white[0]), int(motions.known_white[0]), motions.count)
 
     @property
     def lead_without_bits(self) -> float:
@@ -429,7 +428,7 @@ def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bo
 def _uncertain_reason(placed: PlacedPart) -> Reason:
     """Why a part has no certain motion."""
     if placed.bits is not None:
-        is_other = len(placed.motions.score) > 0 and placed.bits.is_other(*placed.evidence)
+        is_other = len(placed.motions.score) > 0 and placed.bits.is_other(placed.agreement)
         return Reason.OTHER_CODE if is_other else Reason.AMBIGUOUS
     white = placed.motions.white
     close = placed.tied
