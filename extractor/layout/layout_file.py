@@ -102,11 +102,11 @@ def layouts_of(given: LayoutLike | Sequence[LayoutLike]) -> tuple[Reference, ...
 
 def _not_of_family(one: Reference, other: Reference) -> str:
     """What two layouts differ in that pads of one family have in common; empty for none."""
-    is_ink = [np.where(layout.cell_color < BLACK, layout.cell_color, BLACK) for layout in (one, other)]
+    inks = [np.where(layout.cell_color < BLACK, layout.cell_color, BLACK) for layout in (one, other)]
     pairs = {
         "pattern": one.pattern == other.pattern,
         "markers": np.array_equal(one.layer, other.layer) and np.array_equal(one.index, other.index),
-        "cells": np.array_equal(one.cell_corners, other.cell_corners) and np.array_equal(*is_ink),
+        "cells": np.array_equal(one.cell_corners, other.cell_corners) and np.array_equal(inks[0], inks[1]),
         "virtual markers": one.virtual_per_edge == other.virtual_per_edge,
         "palette": one.palette == other.palette,
         "the side that is seen": one.mirrored == other.mirrored,
