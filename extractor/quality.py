@@ -19,9 +19,9 @@ MIN_EVENNESS = 0.2
 class Quality(FrozenRecord):
     """The properties of one image by which its markers can be read, and a hint for each that limits them.
 
-    A property that could not be measured is NaN. Where no marker was found, clipping is that of the whole image, and
-    contrast, evenness and edge are those of the found cells without numbers; the edge is NaN if these cells are no
-    pattern.
+    A property that could not be measured is NaN. Where no marker was found, clipping and noise are those of the whole
+    image, and contrast, evenness and edge are those of the found cells without numbers; the edge is NaN if these cells
+    are no pattern.
 
     Attributes:
         blur_px: sigma of the blur, pixel included, px.

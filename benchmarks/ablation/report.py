@@ -5,6 +5,7 @@ A row is a rule that was ever tried, on the pictures of one seed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -91,8 +92,11 @@ def _line(row: Mapping[str, Any]) -> str:
     return "| " + " | ".join(str(cell) for cell in cells) + " |"
 
 
-def _share(change: Mapping[str, float]) -> str:
-    """The difference and its interval, in percent of the figure with the rule."""
-    unit = 100 / change["full"]
-    difference = unit * (change["without"] - change["full"])
-    return f"{difference:+.1f} [{unit * change['low']:+.1f}, {unit * change['high']:+.1f}]"
+def _share(change: Mapping[str, float | None]) -> str:
+    """The difference and its interval, in percent of the figure with the rule; "-" where nothing is left to measure."""
+    values = [change[name] for name in ("full", "without", "low", "high")]
+    full, without, low, high = (math.nan if value is None else value for value in values)
+    if math.isnan(full + without + low + high):
+        return "-"
+    unit = 100 / full
+    return f"{unit * (without - full):+.1f} [{unit * low:+.1f}, {unit * high:+.1f}]"

@@ -25,7 +25,7 @@ from cmpdesign.cli.commands import (
 from cmpdesign.cli.commands.calibrate import group as calibrate
 from cmpdesign.cli.commands.data import dataset, extract
 from cmpdesign.cli.commands.export import group as export
-from cmpdesign.cli.commands.pages import studio, view
+from cmpdesign.cli.commands.pages import serve, studio, view
 from cmpdesign.cli.commands.starting import cameras, init, schema, templates
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
 from cmpdesign.errors import OutputError
@@ -54,6 +54,7 @@ for module, function in (
     (cameras, cameras.cameras),
     (track, track.track),
     (reconstruct, reconstruct.reconstruct),
+    (serve, serve.serve),
     (dataset, dataset.dataset),
     (extract, extract.extract),
     (kerf, kerf.kerf),

@@ -29,7 +29,7 @@ INTERRUPTED = "interrupted; every file that was written is complete"
 # The commands by what people do, in the order of the help text and of the reference.
 PURPOSES = {
     "Design and make": "templates init studio size check build kerf",
-    "Read and follow": "verify cameras track view reconstruct calibrate",
+    "Read and follow": "verify cameras track view reconstruct serve calibrate",
     "Try before making": "render evaluate",
     "Make data sets": "dataset extract export",
     "For other programs": "schema",

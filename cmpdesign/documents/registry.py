@@ -28,6 +28,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "cameras": (runs.CamerasDocument,),
     "track": (runs.TrackDocument, runs.RecoverDocument),
     "reconstruct": (runs.ReconstructDocument, runs.RecoverDocument),
+    "serve": (runs.ServeDocument,),
     "dataset": (data.DatasetDocument, data.DatasetCheckDocument),
     "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument, reading.GridDocument),

@@ -120,6 +120,14 @@ class ListedCameraPart(Part):
     problem: str = Field(description="Why the camera cannot be asked.")
 
 
+class ServeDocument(Document):
+    """The server of ``serve``; printed when viewers can connect."""
+
+    format: Literal["cmp-serve"] = "cmp-serve"
+    version: Literal[1] = 1
+    address: str = Field(description="Address of the server on this machine.")
+
+
 class CamerasDocument(Document):
     """The cameras that ``cameras`` lists."""
 

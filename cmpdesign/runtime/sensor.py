@@ -71,6 +71,10 @@ class Sensor:
         """What happened to the cameras, the newest last."""
         return self._log.since(0)
 
+    def events_since(self, count: int) -> tuple[SensorEvent, ...]:
+        """The events after the first ``count`` ones."""
+        return self._log.since(count)
+
     @property
     def results(self) -> tuple[SensorFrame, ...]:
         """The last results, the newest last."""

@@ -19,7 +19,7 @@ KEY = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: fo
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    server = FoxgloveServer("tactile", 0)
+    server = FoxgloveServer({"tactile": False}, 0)
     yield int(server.address.rpartition(":")[2])
     server.close()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -39,28 +39,28 @@ class FoxgloveServer:
     """Serves frames to viewers that the gate lets in.
 
     Args:
-        frame_id: the coordinate frame of the markers, and the first part of all topics but the diagnostics'.
+        has_contact: coordinate frame of a sensor's markers, which is the first part of all its topics but the
+            diagnostics' -> whether its frames hold a contact.
         port: a free port on this machine.
         places: places of the shown images. All topics exist before a client can connect: to a connected client,
             the library may offer a topic before it accepts subscriptions to the topic.
-        has_contact: the frames hold a contact.
 
     Raises:
         CmpDesignError: a library is not installed, or the port cannot be opened.
     """
 
-    def __init__(
-        self, frame_id: str, port: int, places: Iterable[ImagePlace] = (), has_contact: bool = False
-    ) -> None:
-        self._foxglove, self._messages = require_foxglove(), TopicMessages(frame_id)
+    def __init__(self, has_contact: Mapping[str, bool], port: int, places: Iterable[ImagePlace] = ()) -> None:
+        self._foxglove = require_foxglove()
+        self._messages = {frame_id: TopicMessages(frame_id) for frame_id in has_contact}
         self._context = self._foxglove.Context()
         self._channels: dict[str, Any] = {}
-        for topic, kind in self._messages.kinds(places, has_contact).items():
-            self._channel(topic, kind)
+        for frame_id, messages in self._messages.items():
+            for topic, kind in messages.kinds(places, has_contact[frame_id]).items():
+                self._channel(topic, kind)
         self._watch, inner = _watch_log(self._foxglove), hidden_address()
         try:
             self._server = self._foxglove.start_server(
-                name=f"cmpdesign: {frame_id}",
+                name=f"cmpdesign: {', '.join(has_contact)}",
                 host=inner,
                 port=0,
                 context=self._context,
@@ -87,9 +87,11 @@ class FoxgloveServer:
     def _is_watched(self) -> bool:
         return any(channel.base.has_sinks() for channel in self._channels.values())
 
-    def send(self, frames: Sequence[RecordedFrame]) -> None:
+    def send(self, frames: Sequence[RecordedFrame], frame_id: str | None = None) -> None:
+        """Send frames of a sensor; None: of the only one."""
+        messages = self._messages[next(iter(self._messages)) if frame_id is None else frame_id]
         for frame in frames:
-            for one in self._messages.of(frame):
+            for one in messages.of(frame):
                 self._channel(one.topic, one.kind).log(bytes(one.data), log_time=one.ns)
 
     def is_behind(self) -> bool:
@@ -106,7 +108,7 @@ class FoxgloveServer:
 
     def _channel(self, topic: str, kind: str) -> Any:
         if topic not in self._channels:
-            text, _ = self._messages.store.generate_msgdef(kind, ros_version=2)
+            text, _ = next(iter(self._messages.values())).store.generate_msgdef(kind, ros_version=2)
             schema = self._foxglove.Schema(name=kind, encoding="ros2msg", data=text.encode())
             self._channels[topic] = self._foxglove.Channel(
                 topic, message_encoding="cdr", schema=schema, context=self._context

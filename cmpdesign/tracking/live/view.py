@@ -147,7 +147,7 @@ def open_view(live: Live, table: FrameTable, recording: Recording) -> LiveView:
         require_foxglove()
         about = shown.about()
         places = image_places(about, recording.is_image_one_a_view) if recording.with_images else ()
-        server = FoxgloveServer(recording.frame_id, live.free_port(), places, "young_mpa" in about)
+        server = FoxgloveServer({recording.frame_id: "young_mpa" in about}, live.free_port(), places)
     else:
         from cmpdesign.tracking.live.rerun_server import RerunServer
         from cmpdesign.tracking.recording.rerun_rows import require_rerun

@@ -35,6 +35,7 @@ CALLS = {
     "calibrate rig": "calibrate_rig",
     "export lerobot": "export_lerobot",
     "export zarr": "export_zarr",
+    "serve": "open_sensor",
 }
 NOT_CALLS = {"init", "studio", "view"}  # of files for editors; of a page
 

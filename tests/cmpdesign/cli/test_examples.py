@@ -19,7 +19,7 @@ from tests.support.made.example_files import prepare_files
 
 GROUPS = {"evaluate", "calibrate", "export"}
 SLOW = {"evaluate"}
-SERVERS = {"studio", "view"}  # run until Ctrl-C; tests/cmpdesign/studio runs them
+SERVERS = {"serve", "studio", "view"}  # run until Ctrl-C; tests/cmpdesign/studio and runtime run them
 
 
 def examples(*words: str) -> list[str]:

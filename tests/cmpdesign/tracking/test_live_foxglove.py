@@ -114,7 +114,7 @@ def test_a_client_that_does_not_read_costs_neither_memory_nor_time() -> None:
     frame.
     """
     place = ImagePlace("tactile", ())
-    server = FoxgloveServer("tactile", free_port(), [place])
+    server = FoxgloveServer({"tactile": False}, free_port(), [place])
     markers, received = np.zeros(331, IN_IMAGE), Received()
 
     def frame(number: int) -> RecordedFrame:
@@ -143,7 +143,7 @@ def test_a_client_that_does_not_read_costs_neither_memory_nor_time() -> None:
 
 
 def test_only_this_machine_can_connect() -> None:
-    server = FoxgloveServer("tactile", free_port())
+    server = FoxgloveServer({"tactile": False}, free_port())
     port = int(server.address.rpartition(":")[2])
     with socket.create_connection(("127.0.0.1", port), 5):
         pass
