@@ -318,8 +318,7 @@ def verify(
         extractor.LayoutError: a layout that cannot be read, or layouts that are no family.
         OutputError: the report cannot be written.
     """
-    is_family = isinstance(layout, Sequence) and not isinstance(layout, str)
-    layouts = list(layout) if is_family else [layout]
+    layouts = [layout] if isinstance(layout, str) or not isinstance(layout, Sequence) else list(layout)
     verifier = Verifier([reference_from(one) for one in layouts], **options)
     if report is not None and len(layouts) != 1:
         raise CmpDesignError("report: a bundle holds one layout; give the layout of the pad")

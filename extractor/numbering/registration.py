@@ -73,7 +73,7 @@ class Motions(NamedTuple):
         white: (K,) float64, the log odds of the white places alone.
         known_white: (K,) int32, the number of the known ones of these.
         rival_without_white: the best score of all motions of the part but the first, without their white places.
-        count: number of all motions of the part.
+        compared: number of all motions of the part.
     """
 
     motion: NDArray[np.int32]
@@ -82,7 +82,7 @@ class Motions(NamedTuple):
     white: NDArray[np.float64]
     known_white: NDArray[np.int32]
     rival_without_white: float
-    count: int
+    compared: int
 
     def chosen(self, order: NDArray[np.intp], score: NDArray[np.float64]) -> Motions:
         """Some of the motions, with other scores."""
@@ -221,7 +221,7 @@ class PlacedPart(NamedTuple):
     def agreement(self) -> Agreement:
         """Of the best motion."""
         motions = self.motions
-        return Agreement(float(motions.white[0]), int(motions.known_white[0]), motions.count)
+        return Agreement(float(motions.white[0]), int(motions.known_white[0]), motions.compared)
 
     @property
     def lead_without_bits(self) -> float:
