@@ -25,6 +25,7 @@ def measure(layers: int = 10, parts: int = 100_000, pictures: int = 64, seed: in
             group = f"{pads} pads, {share:.0%} in view, {name}"
             rows.append((group, found.total(), found["right"] / found.total(), found["wrong"]))
     yield Table(f"pads of a family, {layers} layers", {"pictures of": TEXT, **COLUMNS}, rows)
+    return None
 
 
 main = Experiment("pad_codes", measure)
