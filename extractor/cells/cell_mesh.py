@@ -16,27 +16,6 @@ from extractor._native import cells as native
 from extractor.cells.cells import Cells
 
 
-class CellMeshLimits(NamedTuple):
-    """Limits of the mesh.
-
-    Attributes:
-        first_tolerance: L of eq. 5, in edges of the smaller cell, between two corners while the swelling is unknown;
-            the next corner is an edge away. Chosen.
-        tolerance: the same with the swelling. Chosen.
-        direction_tolerance: in edges, between a neighbour's center and where a cell's own triangle expects it. Chosen.
-        min_swelling, max_swelling: of a whole image. Chosen.
-    """
-
-    first_tolerance: float = 0.65
-    tolerance: float = 0.4
-    direction_tolerance: float = 0.56
-    min_swelling: float = 0.6
-    max_swelling: float = 1.6
-
-
-LIMITS = CellMeshLimits()
-
-
 class CellLinks(NamedTuple):
     """The links of N cells as native loops take them.
 
@@ -74,6 +53,6 @@ class CellMesh:
 
 def build_cell_mesh(cells: Cells) -> CellMesh:
     """Stage 6: the links of the cells."""
-    *links, swelling = native.link_cells(cells.center_px, cells.corner_px, LIMITS)
+    links, swelling = native.link_cells(cells.center_px, cells.corner_px)
     center = cells.center_px[:, None]
-    return CellMesh(CellLinks(*links), swelling, center + (cells.corner_px - center) / swelling)
+    return CellMesh(links, swelling, center + (cells.corner_px - center) / swelling)

@@ -8,7 +8,7 @@ no color of the light is assumed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,50 +21,6 @@ MIN_SPREAD = 12  # between the channels of a colored pixel, gray levels; chosen
 COLORED_SHARE = 0.002  # of an image that is not gray; chosen
 MIN_TILE_PX = 6  # of the tiles of local levels; chosen
 MAX_TILE_PX = 24
-
-
-class ShapeLimits(NamedTuple):
-    """Limits of the shapes of triangles.
-
-    Attributes:
-        max_elongation: (trace of the covariance)^2 / determinant; 4 is equilateral. Chosen.
-        min_solidity, max_solidity: area over the root of the determinant of the covariance, relative to a triangle's;
-            an ellipse has 1.21, ragged regions have less. Chosen.
-        ragged_weight: of the difference between solidity and 1 in the quality of a shape. Chosen.
-    """
-
-    max_elongation: float = 13.0
-    min_solidity: float = 0.7
-    max_solidity: float = 1.25
-    ragged_weight: float = 1.5
-
-
-class CellLimits(NamedTuple):
-    """Limits of cells.
-
-    Attributes:
-        shape: of their triangles.
-        min_area_px: px^2 at the scale of recognition: edges of 5 px. Chosen.
-        max_area_share: of the image. Chosen.
-        same_place: in edges, of the distance within which two regions are one cell; neighbours are an edge apart.
-            Chosen.
-        min_contrast_deviations: least contrast, in standard deviations of the noise. Chosen.
-        level_weight: in the quality, of the logarithm of a region's level over half of its contrast, where the true
-            outline is. Chosen.
-        tile_px: of the tiles of local levels; a cell and its black neighbours fit into three by three. Derived:
-            half of the largest edge.
-    """
-
-    shape: ShapeLimits = ShapeLimits()
-    min_area_px: float = 12.0
-    max_area_share: float = 1 / 30
-    same_place: float = 0.42
-    min_contrast_deviations: float = 7.0
-    level_weight: float = 0.35
-    tile_px: int = MIN_TILE_PX
-
-
-LIMITS = CellLimits()
 
 
 class Effort(NamedTuple):
@@ -111,6 +67,9 @@ class Cells:
     share: NDArray[np.float64]
 
 
+NO_CELLS = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3, 2)), np.zeros(0), np.zeros(0))
+
+
 def has_color(image: NDArray[np.uint8]) -> bool:
     """Whether some pixels of an image (H, W, 3) have a color: others than gray, black and white."""
     spread = image.max(axis=2) - image.min(axis=2)
@@ -129,22 +88,21 @@ def find_cells(
         before: regions that were found with less effort.
     """
     scale = view.scale
+    # a cell and its black neighbours fit into three by three tiles
     tile_px = int(min(max(0.5 * largest_edge_px / scale, MIN_TILE_PX), MAX_TILE_PX))
-    known = (np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3, 2)), np.zeros(0), np.zeros(0))
+    known = NO_CELLS
     if before is not None:
-        corners = view.to_level(before.corner_px)
-        known = (
-            view.to_level(before.center_px),
-            before.area_px / scale**2,
-            corners,
-            before.quality,
-            before.share,
+        known = replace(
+            before,
+            center_px=view.to_level(before.center_px),
+            area_px=before.area_px / scale**2,
+            corner_px=view.to_level(before.corner_px),
         )
-    center, area, corner, quality, share = native.find_candidates(
-        np.ascontiguousarray(view.image),
-        effort.maps,
-        effort.shares,
-        *known,
-        LIMITS._replace(tile_px=tile_px),
+    image = np.ascontiguousarray(view.image)
+    found = native.find_candidates(image, effort.maps, effort.shares, known, tile_px)
+    return replace(
+        found,
+        center_px=view.to_full_scale(found.center_px),
+        area_px=found.area_px * scale**2,
+        corner_px=view.to_full_scale(found.corner_px),
     )
-    return Cells(view.to_full_scale(center), area * scale**2, view.to_full_scale(corner), quality, share)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -14,20 +13,6 @@ from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 
 MAX_GROWN_AREA = 2.0  # of the seed's region; a larger region has leaked. Chosen
-
-
-class GrowLimits(NamedTuple):
-    """The limit of growing.
-
-    Attributes:
-        threshold: of eq. 3 over OpenCV's 8-bit HSV, below which a pixel belongs to the region; as in the article.
-            Published: the article, below eq. 3.
-    """
-
-    threshold: float = 0.15
-
-
-LIMITS = GrowLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,5 +40,5 @@ def grow(view: PyramidLevel, cells: Cells) -> Regions:
     seed = np.clip(np.rint(view.to_level(cells.center_px)), 0, (width - 1, height - 1)).astype(np.int32)
     limit_px = np.maximum(MAX_GROWN_AREA * cells.area_px / view.scale**2, 1).astype(np.int64)
     hsv = cv2.cvtColor(view.image, cv2.COLOR_BGR2HSV)
-    framed, moments = native.grow(hsv, seed, limit_px, LIMITS)
+    framed, moments = native.grow(np.asarray(hsv, np.uint8), seed, limit_px)
     return Regions(region_map=framed[1:-1, 1:-1], seed=seed, moments=moments)

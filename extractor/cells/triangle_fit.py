@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import cells as native
-from extractor.cells.cells import LIMITS, Cells
+from extractor.cells.cells import Cells
 from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_edges import update_triangle_corners
 from extractor.image.pyramid import PyramidLevel
@@ -20,7 +20,7 @@ def regions_as_cells(cells: Cells, regions: Regions, view: PyramidLevel) -> Cell
         regions: grown from them.
         view: the image in which they were grown.
     """
-    corners, quality = native.fit_to_moments(regions.moments, regions.seed, LIMITS.shape)
+    corners, quality = native.fit_to_moments(regions.moments, regions.seed)
     better = quality > cells.quality
     corner_px = np.where(better[:, None, None], view.to_full_scale(corners), cells.corner_px)
     return Cells(

@@ -10,38 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import complete as native
-from extractor.image.input import LIMITS as NOISE_LIMITS
-from extractor.image.input import NoiseLimits
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.quality import UNKNOWN, Quality
-from extractor.refine.measure.gridline_weights import LIMITS as GRIDLINE_LIMITS
-from extractor.refine.measure.gridline_weights import GridlineWeightLimits
 
 CELLS_PER_INK = 40  # that are sampled; chosen
 # of the pixels by which the clipping of an image without numbers is measured; chosen, for time
 CLIPPING_STRIDE = 4
-
-
-class QualityLimits(NamedTuple):
-    """Limits of the quality.
-
-    Attributes:
-        clipped_value: of 255, from which on a cell's mean is clipped; noise pulls it below 255. Chosen.
-        dim_quantile: of the cells' light, that is the dimmest; the brightest are as many. Chosen.
-        sample_radius: in edges, over which a cell's color is averaged. Chosen.
-        noise: of the estimate of the noise.
-        gridlines: with the least median length of the edges.
-    """
-
-    clipped_value: float = 253.0
-    dim_quantile: float = 0.05
-    sample_radius: float = 0.08
-    noise: NoiseLimits = NOISE_LIMITS
-    gridlines: GridlineWeightLimits = GRIDLINE_LIMITS
-
-
-LIMITS = QualityLimits()
 
 
 class CellFigures(NamedTuple):
@@ -104,8 +79,8 @@ def measure_quality(
         edges: (E, 2) the layout's edges.
         blur_px: sigma of the blur.
     """
-    found, noise, edge_px = native.measure_numbered(view, cells, xy_px, edges, LIMITS)
-    return _quality(CellFigures(*found), blur_px, noise, edge_px)
+    found, noise, edge_px = native.measure_numbered(view, cells, xy_px, edges)
+    return _quality(found, blur_px, noise, edge_px)
 
 
 def measure_quality_without_numbers(view: PyramidLevel, edge_px: float) -> Quality:
@@ -116,7 +91,7 @@ def measure_quality_without_numbers(view: PyramidLevel, edge_px: float) -> Quali
         edge_px: the median side of cells that are neighbours as in a pattern; NaN without any.
     """
     sampled = view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE]
-    clipping = float((sampled.max(axis=2) >= LIMITS.clipped_value).mean())
+    clipping = float((sampled.max(axis=2) >= native.CLIPPED_VALUE).mean())
     return replace(UNKNOWN, clipping=clipping, noise=_image_noise(view.image), edge_px=edge_px)
 
 

@@ -110,7 +110,7 @@ def find_row_break(topology: Topology, markers: RepairedMarkers, size_px: tuple[
     largest = float(rows.max(initial=0.0))
     if largest <= max(LIMITS.min_jump * edge, LIMITS.ratio * columns.max(initial=0.0)):
         return _lost_along_a_row(topology, markers, size_px, edge)
-    middle, squares = (np.arange(len(rows)) + 0.5) * LIMITS.bin * edge, rows**2
+    middle, squares = (np.arange(len(rows), dtype=np.float64) + 0.5) * LIMITS.bin * edge, rows**2
     near = np.abs(middle - np.average(middle, weights=squares)) < LIMITS.spread * edge
     if squares[near].sum() < LIMITS.concentrated * squares.sum():
         return RowBreak("rolling shutter", largest, middle, rows, edge)

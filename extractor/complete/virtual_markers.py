@@ -7,8 +7,6 @@ drawn, gives the gridline's offset.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,26 +14,7 @@ from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
 from extractor.refine.measure.marker_scatter import MarkerScatter
-from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
-from extractor.refine.synthesis.gridlines import GridlineLimits
 from extractor.result import VirtualMarkers
-
-
-class VirtualLimits(NamedTuple):
-    """Limits of virtual markers.
-
-    Attributes:
-        max_measured_offset: in edges, of a measured point from the interpolated one; larger offsets are dirt. Chosen.
-        bend_uncertainty: deviation of the interpolated point, as a share of its distance from the chord. Chosen.
-        gridlines: of the maps between the markers.
-    """
-
-    max_measured_offset: float = 0.08
-    bend_uncertainty: float = 0.05
-    gridlines: GridlineLimits = GRIDLINE_LIMITS
-
-
-LIMITS = VirtualLimits()
 
 
 def locate_virtual_markers(
@@ -50,4 +29,4 @@ def locate_virtual_markers(
         points: (E, m, 3) float64, measured x and y (px) and their variance across the gridline (px^2), NaN for none.
         scatter: of the markers; with scatter, the gridlines curve by the map's second derivatives.
     """
-    return VirtualMarkers(*native.locate_on_edges(repaired, scatter, topology, points, LIMITS))
+    return native.locate_on_edges(repaired, scatter, topology, points)

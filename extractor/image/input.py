@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -14,19 +14,6 @@ from extractor.errors import ImageError
 Channels = Literal["bgr", "rgb"]  # the order of an image's colors
 
 MIN_SIDE_PX = 16  # of an image
-
-
-class NoiseLimits(NamedTuple):
-    """Limits of the estimate of the noise.
-
-    Attributes:
-        samples: pixels for the estimate; with fewer cells, several pixels in each. Chosen.
-    """
-
-    samples: int = 600
-
-
-LIMITS = NoiseLimits()
 
 
 def convert_to_bgr(image: NDArray[Any], channels: Channels = "bgr") -> NDArray[np.uint8] | None:
@@ -84,4 +71,4 @@ def estimate_noise(image: NDArray[np.uint8], xy: NDArray[np.float64], cells: NDA
         NaN where no cell lies within the image.
     """
     cells = np.ascontiguousarray(cells, dtype=np.int32)
-    return float(native.estimate_noise(image, np.ascontiguousarray(xy), cells, LIMITS))
+    return float(native.estimate_noise(image, np.ascontiguousarray(xy), cells))

@@ -17,12 +17,12 @@ NEIGHBOUR_STEPS = np.array(
 
 def layer_of(q: int, r: int) -> int:
     """The layer of the marker at the axial (q, r)."""
-    return int(native.layer_of(q, r))
+    return native.layer_of(q, r)
 
 
 def marker_id(q: int, r: int) -> int:
     """The id of the marker at the axial (q, r)."""
-    return int(native.marker_id(q, r))
+    return native.marker_id(q, r)
 
 
 def axial_coordinates(layer: NDArray[np.int32], index: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -176,9 +176,9 @@ def _down_axial(corners: NDArray[np.int32]) -> NDArray[np.int32]:
 
 def cells_at(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
     """(N,) int32, the layout's cell at each axial (q, r) of (N, 2), or -1."""
-    return np.asarray(native.cells_at(np.ascontiguousarray(axial, dtype=np.int32), lattice.cell_lookup))
+    return native.cells_at(np.ascontiguousarray(axial, dtype=np.int32), lattice.cell_lookup)
 
 
 def corner_marker_ids(axial: NDArray[np.int32]) -> NDArray[np.int32]:
     """(N, 3) int32 ids of the markers (q, r), (q + 1, r), (q, r + 1), the corners of the cells at (q, r) of (N, 2)."""
-    return np.asarray(native.corner_ids(np.ascontiguousarray(axial, dtype=np.int32)))
+    return native.corner_ids(np.ascontiguousarray(axial, dtype=np.int32))

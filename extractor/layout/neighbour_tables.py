@@ -38,7 +38,7 @@ LIMITS = NeighbourMapLimits()
 
 def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
     """(M, 18) int32, the ids of the markers in the two rings around each marker at (M, 2); -1 outside the pattern."""
-    return np.asarray(native.neighbour_ids(axial, RING_STEPS, layers))
+    return native.neighbour_ids(axial, RING_STEPS, layers)
 
 
 def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> NDArray[np.float64]:

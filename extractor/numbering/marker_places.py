@@ -13,10 +13,6 @@ from extractor.localmap.affine_maps import LIMITS as MAP_LIMITS
 from extractor.localmap.affine_maps import AffineMapLimits
 from extractor.numbering.missing_cells import NumberedTriangles
 
-AGREED_DEVIATION = 0.04  # in edges, of corners on which triangles agree, where gridlines bend; chosen
-# in edges, between a marker's place by its gridlines and a correct initial place; chosen
-MAX_PLACE_ERROR = 0.1
-
 
 class CornerLimits(NamedTuple):
     """Limits of corners.

@@ -21,4 +21,4 @@ def fill_patch_mean(
 
     The image (H, W, 3) is passed as ``flat`` (3 H W,) with its height and width.
     """
-    return bool(native.fill_patch_mean(flat, height, width, x, y, radius, out))
+    return native.fill_patch_mean(flat, height, width, x, y, radius, out)

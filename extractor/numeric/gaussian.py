@@ -18,7 +18,7 @@ CORNER_TERMS = 9  # of a corner; as in native/numeric/gaussian.hpp
 
 def normal_cdf(z: float) -> float:
     """The normal distribution of z, abs(z) <= 3.3, in single precision."""
-    return float(native.normal_cdf(z))
+    return native.normal_cdf(z)
 
 
 def fill_corner_terms(r: float, out: NDArray[np.float32]) -> None:
@@ -36,4 +36,4 @@ def wedge_correlation(squares: float, product: float, corner: Sequence[float]) -
         squares: h^2 + k^2; product: h k.
         corner: the terms of ``fill_corner_terms``.
     """
-    return float(native.wedge_correlation(squares, product, corner))
+    return native.wedge_correlation(squares, product, corner)

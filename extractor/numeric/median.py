@@ -10,7 +10,7 @@ from extractor._native import numeric as native
 
 def median_of(values: NDArray[np.float64], count: int) -> float:
     """The median of the first ``count`` values, at least one and none of them NaN."""
-    return float(native.median_of(values, count))
+    return native.median_of(values, count)
 
 
 def select(values: NDArray[np.float64], place: int) -> float:
@@ -18,4 +18,4 @@ def select(values: NDArray[np.float64], place: int) -> float:
 
     The order of the values changes: none before the place is larger, none after it smaller.
     """
-    return float(native.select(values, place))
+    return native.select(values, place)

@@ -21,4 +21,4 @@ def nearest_points(xy: Points, queries: Points, count: int = 1) -> NDArray[np.in
     Raises:
         ValueError: ``count`` is larger than N.
     """
-    return np.asarray(native.nearest_points(xy, queries, count))
+    return native.nearest_points(xy, queries, count)

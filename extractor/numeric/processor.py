@@ -13,4 +13,4 @@ def use_widest_vectors(is_widest: bool) -> bool:
     Returns:
         Whether the two differ on this processor.
     """
-    return bool(native.use_widest_vectors(is_widest))
+    return native.use_widest_vectors(is_widest)

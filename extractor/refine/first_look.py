@@ -2,60 +2,24 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import markers as native
-from extractor.image.input import LIMITS as NOISE_LIMITS
-from extractor.image.input import NoiseLimits
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.refine.estimate import Appearance, EdgeContrasts, Estimate
-from extractor.refine.measure.edge_profiles import LIMITS as PROFILE_LIMITS
-from extractor.refine.measure.edge_profiles import EdgeProfileLimits
-from extractor.refine.measure.gridline_weights import LIMITS as WEIGHT_LIMITS
-from extractor.refine.measure.gridline_weights import GridlineWeightLimits
-from extractor.refine.synthesis.blur_bleed import LIMITS as BLEED_LIMITS
-from extractor.refine.synthesis.blur_bleed import BleedLimits, remove_bleed
-from extractor.refine.synthesis.ink_levels import LIMITS as LEVEL_LIMITS
-from extractor.refine.synthesis.ink_levels import InkLevelLimits, InkLevels
+from extractor.refine.synthesis.blur_bleed import remove_bleed
 
 DEFAULT_SIGMA_PX = 1.5  # assumed before the blur is measured; chosen
 # of a neighbour's level in the middle of a cell, above which bleed is removed; chosen
 MIN_CORRECTED_BLEED = 0.002
 
 
-class FirstLookLimits(NamedTuple):
-    """Limits of the first look.
-
-    Attributes:
-        fallback_sigma_px: the blur where no gridline shows it. Chosen.
-        blur_gridlines: gridlines for the first estimate of the blur. Chosen.
-        noise: of the estimate of the noise.
-        levels: of the inks.
-        profiles: of the profiles across gridlines.
-        bleed: of the bleed.
-        weights: with the least noise and blur.
-    """
-
-    fallback_sigma_px: float = 0.9
-    blur_gridlines: int = 60
-    noise: NoiseLimits = NOISE_LIMITS
-    levels: InkLevelLimits = LEVEL_LIMITS
-    profiles: EdgeProfileLimits = PROFILE_LIMITS
-    bleed: BleedLimits = BLEED_LIMITS
-    weights: GridlineWeightLimits = WEIGHT_LIMITS
-
-
-LIMITS = FirstLookLimits()
-
-
 def initial_appearance(view: PyramidLevel, topology: Topology, xy: NDArray[np.float64]) -> Appearance:
     """The noise, and the levels from the middles of the cells at the markers (M, 2), px; the blur is 0: not known."""
-    noise, levels = native.initial_appearance(view, topology, xy, DEFAULT_SIGMA_PX / view.scale, LIMITS)
-    return Appearance(view.scale, 0.0, noise, InkLevels(*levels), noise)
+    noise, levels = native.initial_appearance(view, topology, xy, DEFAULT_SIGMA_PX / view.scale)
+    return Appearance(view.scale, 0.0, noise, levels, noise)
 
 
 def update_edge_contrasts(
@@ -65,7 +29,7 @@ def update_edge_contrasts(
     ``lines``.
     """
     where = lines, estimate.xy, topology
-    return EdgeContrasts(*native.edge_contrasts(*where, estimate.levels, view, LIMITS))
+    return native.edge_contrasts(*where, estimate.levels, view)
 
 
 def update_blur_and_bleed(
@@ -79,7 +43,7 @@ def update_blur_and_bleed(
     bleed."""
     assumed = DEFAULT_SIGMA_PX / view.scale
     sigma, share, median_share = native.blur_and_bleed(
-        view, lines, contrasts, estimate.xy, topology.cells, assumed, LIMITS
+        view, lines, contrasts, estimate.xy, topology.cells, assumed
     )
     estimate = estimate._replace(sigma=sigma)
     if median_share > MIN_CORRECTED_BLEED:

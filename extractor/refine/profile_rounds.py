@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,46 +11,10 @@ from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.refine.estimate import EdgeContrasts, Estimate
-from extractor.refine.measure.matched_filter import LIMITS as ROW_LIMITS
-from extractor.refine.measure.matched_filter import MatchedFilterLimits
-from extractor.refine.outliers import LIMITS as OUTLIER_LIMITS
-from extractor.refine.outliers import OutlierLimits
-from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
-    MisfitRule,
-    StepLimits,
     StepSolution,
     with_solution,
 )
-from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
-from extractor.refine.synthesis.dot_gain import DotGainLimits
-
-SAMPLE_MISFIT_RULE = MisfitRule(1, 4, 1.0)
-MISFIT_TOLERANCE = 0.1  # of the contrast, by glare and uneven light in a profile; chosen
-
-
-class ProfileLimits(NamedTuple):
-    """Limits of a round of profiles.
-
-    Attributes:
-        misfit_tolerance: of the contrast; what glare and uneven light make in a profile does not lower its weight.
-            Chosen.
-        rule: by which gridlines are weighed.
-        step: of the step.
-        rows: of the rows of pixels.
-        dot_gain: of the dot gain.
-        outliers: of the markers around which gridlines are tested.
-    """
-
-    misfit_tolerance: float = MISFIT_TOLERANCE
-    rule: MisfitRule = SAMPLE_MISFIT_RULE
-    step: StepLimits = STEP_LIMITS
-    rows: MatchedFilterLimits = ROW_LIMITS
-    dot_gain: DotGainLimits = DOT_GAIN_LIMITS
-    outliers: OutlierLimits = OUTLIER_LIMITS
-
-
-LIMITS = ProfileLimits()
 
 
 class ProfileStep(NamedTuple):
@@ -60,13 +24,13 @@ class ProfileStep(NamedTuple):
         profile_weight: (E,) 0 to 1, similarity of each gridline to the pattern.
         weight: (E,) 0 to 1, with which it was used.
         dot_gain: px.
-        solution: the markers after the step, the fields of ``StepSolution``.
+        solution: the markers after the step.
     """
 
     profile_weight: NDArray[np.float64]
     weight: NDArray[np.float64]
     dot_gain: float
-    solution: tuple[Any, ...]
+    solution: StepSolution
 
 
 def profile_step(
@@ -93,7 +57,6 @@ def profile_step(
     Returns:
         The estimate after the round, and (E,) 0 to 1, similarity of gridlines to the pattern.
     """
-    given = view, lines, contrasts, estimate, topology, stations
-    step = ProfileStep(*native.profile_step(*given, LIMITS))
-    after = with_solution(estimate, StepSolution(*step.solution), weight=step.weight, dot_gain=step.dot_gain)
+    step = native.profile_step(view, lines, contrasts, estimate, topology, stations)
+    after = with_solution(estimate, step.solution, weight=step.weight, dot_gain=step.dot_gain)
     return after, step.profile_weight

@@ -15,41 +15,10 @@ from extractor._native import markers as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.numbering.marker_places import InitialMarkers
-from extractor.refine.acceptance import HIDDEN_MARKER_LIMITS, AcceptanceLimits, HiddenMarkerLimits
-from extractor.refine.acceptance import LIMITS as ACCEPTANCE_LIMITS
 from extractor.refine.estimate import EdgeContrasts, Estimate
-from extractor.refine.profile_rounds import LIMITS as PROFILE_LIMITS
-from extractor.refine.profile_rounds import ProfileLimits
-from extractor.refine.synthesis.gridlines import LIMITS as GRIDLINE_LIMITS
-from extractor.refine.synthesis.gridlines import GridlineLimits
 
 
-class RecoveryLimits(NamedTuple):
-    """Limits of the round.
-
-    Attributes:
-        stations: of a gridline. Chosen.
-        reference_interval: one of so many other gridlines is read. Chosen.
-        min_reference_gridlines: other gridlines for the usual misfit; with fewer, all together give it. Chosen.
-        profiles: of the profiles.
-        gridlines: of the gridlines.
-        acceptance: of the markers.
-        hidden: of the covered ones.
-    """
-
-    stations: int = 16
-    reference_interval: int = 12
-    min_reference_gridlines: int = 20
-    profiles: ProfileLimits = PROFILE_LIMITS
-    gridlines: GridlineLimits = GRIDLINE_LIMITS
-    acceptance: AcceptanceLimits = ACCEPTANCE_LIMITS
-    hidden: HiddenMarkerLimits = HIDDEN_MARKER_LIMITS
-
-
-LIMITS = RecoveryLimits()
-
-
-class _LostMarkers(NamedTuple):
+class LostMarkers(NamedTuple):
     """The markers to fill in, as ``fill_recovered_markers`` takes them."""
 
     lost: NDArray[np.bool_]
@@ -78,5 +47,5 @@ def fill_recovered_markers(
         lost: (M,) bool.
         xy, cov: (M, 2) px and (M, 2, 2) px^2, written; NaN where a lost marker is not accepted, or far from its place.
     """
-    markers = _LostMarkers(lost, xy, cov)
-    native.fill_recovered_markers(view, estimate, contrasts, places, topology, markers, LIMITS)
+    markers = LostMarkers(lost, xy, cov)
+    native.fill_recovered_markers(view, estimate, contrasts, places, topology, markers)

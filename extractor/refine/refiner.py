@@ -8,15 +8,16 @@ One such step is nearly enough.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import measure
 from extractor._native import refine as native
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.layout.topology import Topology
-from extractor.numbering.marker_places import AGREED_DEVIATION, InitialMarkers
+from extractor.numbering.marker_places import InitialMarkers
 from extractor.presets import SCHEDULES, Preset
 from extractor.refine.acceptance import (
     accept_markers,
@@ -30,12 +31,9 @@ from extractor.refine.estimate import (
     places_in_view,
 )
 from extractor.refine.first_look import initial_appearance, update_blur_and_bleed, update_edge_contrasts
+from extractor.refine.measure.dot_gain import markers_without_dot_gain
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
-from extractor.refine.measure.gridline_weights import (
-    MIN_NOISE,
-    MIN_SIGMA_PX,
-    short_edge,
-)
+from extractor.refine.measure.gridline_weights import short_edge
 from extractor.refine.outliers import correct_outliers
 from extractor.refine.profile_rounds import profile_step
 from extractor.refine.recovered_markers import fill_recovered_markers
@@ -46,7 +44,6 @@ from extractor.refine.refinement_step import (
 )
 from extractor.refine.relief import find_parallax, without_parallax
 from extractor.refine.solve.fisher_information import Information
-from extractor.refine.synthesis.dot_gain import markers_without_dot_gain
 from extractor.refine.synthesis_steps import SynthesisSolver
 
 SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first. Chosen
@@ -56,19 +53,6 @@ MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
 RELIEF_POINTS = 3  # on each gridline, by which the parallax of cells is found; chosen
-
-
-class FullScaleLimits(NamedTuple):
-    """Limits of the markers at the full scale.
-
-    Attributes:
-        agreed_deviation: in edges, of the place of a lost marker on which all triangles agree. Chosen.
-    """
-
-    agreed_deviation: float = AGREED_DEVIATION
-
-
-FULL_SCALE_LIMITS = FullScaleLimits()
 
 
 class Refiner:
@@ -230,7 +214,7 @@ class Refiner:
         assert reading is not None
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
-        xy, cov = native.at_full_scale(xy, cov, places, scale, FULL_SCALE_LIMITS)
+        xy, cov = native.at_full_scale(xy, cov, places, scale)
         parallax = None
         if self._topology.cell_height != 0.0:
             beside = measure_virtual_markers(view, picture, reading, RELIEF_POINTS)[..., :2]
@@ -256,10 +240,10 @@ def rescaled(estimate: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estim
         measured=ratio * estimate.measured + shift,
         reliable=ratio * estimate.reliable + shift,
         maps=ratio * estimate.maps,
-        sigma=max(float(np.sqrt(blur2)) / view.scale, MIN_SIGMA_PX),
+        sigma=max(float(np.sqrt(blur2)) / view.scale, measure.MIN_SIGMA_PX),
         dot_gain=ratio * estimate.dot_gain,
-        noise=max(ratio * estimate.noise, MIN_NOISE),
-        pixel_noise=max(ratio * estimate.pixel_noise, MIN_NOISE),
+        noise=max(ratio * estimate.noise, measure.MIN_NOISE),
+        pixel_noise=max(ratio * estimate.pixel_noise, measure.MIN_NOISE),
         levels=estimate.levels._replace(slope=estimate.levels.slope / ratio),
         bend=ratio * estimate.bend,
         scatter=estimate.scatter.at_scale(ratio),

@@ -12,16 +12,10 @@ from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.presets import Schedule
-from extractor.refine.drawn_pattern import LIMITS as DRAWING_LIMITS
-from extractor.refine.drawn_pattern import DrawingLimits
 from extractor.refine.estimate import Estimate
 from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.measure.marker_scatter import NO_SCATTER
-from extractor.refine.refinement_step import LIMITS as STEP_LIMITS
 from extractor.refine.refinement_step import (
-    PIXEL_MISFIT_RULE,
-    MisfitRule,
-    StepLimits,
     StepSolution,
     scatter_of,
     with_pattern_bent,
@@ -32,39 +26,18 @@ from extractor.refine.solve.convergence import (
     step_remainder,
     typical_bending,
 )
-from extractor.refine.synthesis.dot_gain import LIMITS as DOT_GAIN_LIMITS
-from extractor.refine.synthesis.dot_gain import DotGainLimits
 from extractor.refine.synthesis.ink_levels import InkLevels
 
 MAX_PICTURES = 2  # kept, for images of so many shapes; chosen, for memory
-
-
-class SynthesisLimits(NamedTuple):
-    """Limits of a step by synthesis.
-
-    Attributes:
-        max_steps: each over all markers. Chosen: clean pictures take one or two, dirt and scatter up to four.
-        rule: rule of the gridlines' weights.
-        step: of the step.
-        dot_gain: of the dot gain.
-        drawing: of the drawing.
-        small_change: share of the blur, by which blur and dot gain together change in a step after which no step may
-            follow. Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by
-            0.15 in the second step. Measured: rule "settled appearance".
-        small_bend: RMS of the gridlines' bending, which the first step does not follow, after which no step may follow,
-            in deviations of a marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
-    """
-
-    max_steps: int = 4
-    rule: MisfitRule = PIXEL_MISFIT_RULE
-    step: StepLimits = STEP_LIMITS
-    dot_gain: DotGainLimits = DOT_GAIN_LIMITS
-    drawing: DrawingLimits = DRAWING_LIMITS
-    small_change: float = 0.05
-    small_bend: float = 2.0
-
-
-LIMITS = SynthesisLimits()
+# each over all markers. Chosen: clean pictures take one or two, dirt and scatter up to four.
+MAX_STEPS = 4
+# share of the blur, by which blur and dot gain together change in a step after which no step may follow.
+# Sharp pictures of inks that did not bleed change by 0.01, inks that bled by a tenth of an edge by 0.15 in
+# the second step. Measured: rule "settled appearance".
+SMALL_CHANGE = 0.05
+# RMS of the gridlines' bending, which the first step does not follow, after which no step may follow, in
+# deviations of a marker. With larger ones, the rim's markers are off. Measured: rule "bent gridlines".
+SMALL_BEND = 2.0
 
 
 class SynthesisStep(NamedTuple):
@@ -72,21 +45,21 @@ class SynthesisStep(NamedTuple):
 
     Attributes:
         reading: the gridlines as they were drawn and read.
-        solution: the markers after the step, the fields of ``StepSolution``.
+        solution: the markers after the step.
         bend_variance: (E,) px^2.
         dot_gain: px.
         sigma: px, the blur after the step.
-        levels: the fields of ``InkLevels`` at that blur.
+        levels: of the inks at that blur.
         is_read: (E,) bool, the gridlines that were read.
         edge_px: the median length of the gridlines.
     """
 
-    reading: tuple[Any, ...]
-    solution: tuple[Any, ...]
+    reading: GridlineReading
+    solution: StepSolution
     bend_variance: NDArray[np.float64]
     dot_gain: float
     sigma: float
-    levels: tuple[NDArray[Any], ...]
+    levels: InkLevels
     is_read: NDArray[np.bool_]
     edge_px: float
 
@@ -130,7 +103,7 @@ class SynthesisSolver:
             schedule: the error that a step may leave for no step to follow.
         """
         shift = self._no_shift
-        for _ in range(LIMITS.max_steps):
+        for _ in range(MAX_STEPS):
             before = with_pattern_bent(self._topology, estimate)
             estimate, step = self._full_step(view, before)
             share = remaining_share(before.sigma, step.edge_px)
@@ -146,29 +119,26 @@ class SynthesisSolver:
         Blur or dot gain that has changed, bending that was not drawn, and markers that scatter are drawn otherwise.
         """
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
-        if change_px >= LIMITS.small_change * before.sigma:
+        if change_px >= SMALL_CHANGE * before.sigma:
             return False
         new_bend = 0.0 if before.bend.any() else typical_bending(after.bend, step.is_read, after.information)
-        if new_bend >= LIMITS.small_bend:
+        if new_bend >= SMALL_BEND:
             return False
         return scatter_of(self._topology, after) == NO_SCATTER
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, SynthesisStep]:
         """A step from all measurements: the pattern is drawn, compared with the image, and solved for."""
         picture = self.picture(view.image.shape)
-        step = SynthesisStep(
-            *native.synthesis_step(view, self._topology, picture, estimate, estimate.levels, LIMITS)
-        )
-        reading = GridlineReading(*step.reading)
+        step = native.synthesis_step(view, self._topology, picture, estimate, estimate.levels)
         after = with_solution(
             estimate,
-            StepSolution(*step.solution),
+            step.solution,
             bend_variance=step.bend_variance,
-            weight=reading.weight,
-            reading=reading,
-            noise=reading.noise,
+            weight=step.reading.weight,
+            reading=step.reading,
+            noise=step.reading.noise,
             sigma=step.sigma,
-            levels=InkLevels(*step.levels),
+            levels=step.levels,
             dot_gain=step.dot_gain,
         )
         return after, step

@@ -14,36 +14,6 @@ from extractor.track.warm_tables import WarmTables
 UNSEEN, CONTRADICTED, CONFIRMED = range(3)  # verdicts on a cell; as in native/track/image_check.hpp
 
 
-class CheckLimits(NamedTuple):
-    """Limits of the check.
-
-    Attributes:
-        min_white_ratio: of the white cell's brightness (sum of the channels) to an ink's; black is below. Derived: as
-            in ``WhiteSearchLimits``.
-        min_cosine: between an ink level over black and the same cell's a frame ago, of a confirmed cell. Chosen.
-        min_strength, max_strength: of the ink level over black of a confirmed cell, relative to the same cell's a frame
-            ago. Chosen.
-        inner_sample_position: of the second samples of the ink, as a share of the way from the middle to a corner.
-            Chosen.
-        min_inner_strength: of the ink level at these samples, relative to the middle; across an edge to a black cell it
-            must be less. Chosen.
-        level_radius: of the disc over which the ink is averaged, relative to the distance of a corner. Chosen.
-        smallest_square: of ink levels, to divide by. Derived: it only keeps a division from failing.
-    """
-
-    min_white_ratio: float = 0.75
-    min_cosine: float = 0.8
-    min_strength: float = 0.4
-    max_strength: float = 2.5
-    inner_sample_position: float = 0.5
-    min_inner_strength: float = 0.4
-    level_radius: float = 0.15
-    smallest_square: float = 1e-9
-
-
-LIMITS = CheckLimits()
-
-
 class CellCheck(NamedTuple):
     """The check of C predicted cells.
 
@@ -78,9 +48,7 @@ def check_cells(
     """
     compare = levels_before is not None
     before = np.zeros((len(tables.ink), 3)) if levels_before is None else levels_before[0]
-    return CellCheck(
-        *native.check_cells(np.ascontiguousarray(image), corner_px, tables, before, compare, LIMITS)
-    )
+    return native.check_cells(np.ascontiguousarray(image), corner_px, tables, before, compare)
 
 
 def light_levels(cell_levels: NDArray[np.float64], response: ResponseTables) -> NDArray[np.float64]:

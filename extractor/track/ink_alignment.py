@@ -14,34 +14,6 @@ LARGE_SHIFT = 0.2  # in edges; after a larger shift the window is moved and the 
 RESTING_SHIFT = 0.02  # of a cell from the frame before, in edges, up to which the cell rests; chosen
 
 
-class AlignmentLimits(NamedTuple):
-    """Limits of the alignment.
-
-    Attributes:
-        search_radius: of the window around a cell's middle, in edges. Chosen.
-        min_rows: of pixels that are sampled in the window, at least. Chosen.
-        min_pixel_ink: of an ink, for a pixel to count as this ink. Chosen.
-        min_ink_share: of a cell's area that must show its ink in the window. Chosen.
-        max_shift: of a cell from its prediction, in edges; beyond it the cell's shift is unknown. Chosen.
-        max_spread: of the shifts of cells that share a marker, from their mean, in edges; beyond it the marker is
-            unknown. Chosen.
-        min_volume: sine of the angle of an ink to the plane of the two others, for unmixing. Chosen.
-        min_area_px: px^2, of the parallelogram of the window's unit axes; smaller cells have no shift. Chosen.
-    """
-
-    search_radius: float = 0.9
-    min_rows: int = 8
-    min_pixel_ink: float = 0.2
-    min_ink_share: float = 0.4
-    max_shift: float = 0.35
-    max_spread: float = 0.25
-    min_volume: float = 0.05
-    min_area_px: float = 1.0
-
-
-LIMITS = AlignmentLimits()
-
-
 class AlignedMarkers(NamedTuple):
     """Predicted markers after their cells were moved onto the image.
 
@@ -77,9 +49,7 @@ def align_to_inks(
     for _ in range(2):
         shift = _measure_shifts(image, predicted_px, tables, levels_before)
         shift = _less_resting_shifts(shift, shift_before, predicted_px[tables.corners])
-        aligned = AlignedMarkers(
-            *native.update_shifts_and_move_markers(predicted_px, shift, tables.corners, LIMITS)
-        )
+        aligned = native.update_shifts_and_move_markers(predicted_px, shift, tables.corners)
         if aligned.max_shift < LARGE_SHIFT:
             break
         predicted_px = aligned.xy_px
@@ -117,4 +87,4 @@ def _measure_shifts(
     The ink is unmixed from the two others, whose cells touch this cell's corners, and from white, which shows all
     three. The window is the ellipse that a disc in an equilateral cell becomes when the cell is sheared to its corners.
     """
-    return np.asarray(native.measure_shifts(np.ascontiguousarray(image), xy_px, tables, levels, LIMITS))
+    return native.measure_shifts(np.ascontiguousarray(image), xy_px, tables, levels)

@@ -29,22 +29,19 @@ MIN_PREDICTED = 0.8
 MIN_WHITE_EDGES = 2
 
 
-class WarmStartLimits(NamedTuple):
-    """Limits of the proof.
+class VisibleCells(NamedTuple):
+    """Numbers of cells whose middles lie in the image, and of those whose middles match their own ink best."""
 
-    Attributes:
-        center_radius_px: of the disc over which a middle's color is averaged. Chosen.
-        min_center_strength: of a middle's ink level, relative to the frame before, for the middle to show its ink.
-            Chosen.
-        min_verified_share: of the cells in view that the image must confirm. Chosen.
-    """
-
-    center_radius_px: float = 0.5
-    min_center_strength: float = 0.3
-    min_verified_share: float = 0.95
+    visible: int
+    matching: int
 
 
-LIMITS = WarmStartLimits()
+class VerifiedMarkers(NamedTuple):
+    """The corners of proved cells, NaN elsewhere; ``agreed`` and ``is_intact`` as in ``InitialMarkers``."""
+
+    xy_px: NDArray[np.float64]
+    agreed: NDArray[np.bool_]
+    is_intact: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +74,12 @@ def select_prediction(
     """
     best, best_share = None, MIN_PREDICTED
     for candidate in candidates:
-        visible, matching = native.count_matching_centers(
-            np.ascontiguousarray(image), candidate, tables, levels_before[0], LIMITS
+        cells = native.count_matching_centers(
+            np.ascontiguousarray(image), candidate, tables, levels_before[0]
         )
-        if matching > best_share * visible:
-            best, best_share = candidate, matching / visible
-            if matching == visible:
+        if cells.matching > best_share * cells.visible:
+            best, best_share = candidate, cells.matching / cells.visible
+            if cells.matching == cells.visible:
                 break
     return best
 
@@ -115,9 +112,10 @@ def verify_prediction(
         return None
     first = tables.is_rim if by_rim else tables.is_at_white
     cells = tables.corners, tables.cells_of_marker
-    proved, enough = native.connected_cells(check.verdict, first, known, *cells, LIMITS)
+    proved, enough = native.connected_cells(check.verdict, first, known, *cells)
     if not enough:
         return None
-    xy, agreed, is_intact = native.verified_markers(aligned.xy_px, proved, tables.corners)
-    places = InitialMarkers(level.to_full_scale(xy), aligned.edge_px * level.scale, agreed, is_intact)
+    seen = native.verified_markers(aligned.xy_px, proved, tables.corners)
+    xy_px, edge_px = level.to_full_scale(seen.xy_px), aligned.edge_px * level.scale
+    places = InitialMarkers(xy_px, edge_px, seen.agreed, seen.is_intact)
     return WarmStart(places, np.where(proved[:, None], check.cell_levels, levels_before), by_rim)

@@ -116,4 +116,4 @@ def predict_missing_markers(tables: WarmTables, xy_px: NDArray[np.float64]) -> N
 
     A marker that several cells predict is placed at the mean of these places.
     """
-    return np.asarray(native.predict_missing(tables.completion, tables.completion_weights, xy_px))
+    return native.predict_missing(tables.completion, tables.completion_weights, xy_px)

@@ -1,4 +1,7 @@
-"""Every number of a ``Limits`` record says where it comes from: derived, published, measured, or chosen."""
+"""Every number of a ``Limits`` record says where it comes from: derived, published, measured, or chosen.
+
+A record stands in the language that decides by it: in Python with a docstring, in C++ with a comment at each number.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ from tests.house.source_trees import parsed, python_files
 ROOT = Path(__file__).parents[2]
 SOURCE = re.compile(r"\b(Derived|Published|Measured|Chosen)\b")
 RECORDS = ("Limits", "MisfitRule", "WhiteCellPoints")  # types of fields that explain their own numbers
+STRUCT = re.compile(r"^struct (\w+Limits) \{\n(.*?)^\};", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"(?<!\.)\b(\w+) = ")
 ENTRY = re.compile(r"^        (\w+(?:, \w+)*):", re.MULTILINE)
 
 
@@ -43,6 +48,26 @@ def entries(root: Path) -> Iterator[Entry]:
                 )
 
 
+def entries_in_cpp(root: Path) -> Iterator[Entry]:
+    """The numbers with a default in C++; the comment before a line or at its end is the text of all its numbers."""
+    for path in sorted((root / "extractor" / "native").rglob("*.hpp")):
+        for record, body in STRUCT.findall(path.read_text(encoding="utf-8")):
+            text = ""
+            for line in body.splitlines():
+                code, _, comment = line.strip().partition("//")
+                text += " " + comment.strip()
+                if not code:
+                    continue
+                if re.match(r"  \S", line):  # not within a function
+                    yield from (Entry(path, record, name, text) for name in NUMBER.findall(code))
+                text = ""
+
+
+def every_entry(root: Path) -> Iterator[Entry]:
+    yield from entries(root)
+    yield from entries_in_cpp(root)
+
+
 def _numbers_of(record: ast.ClassDef) -> Iterator[str]:
     for node in record.body:
         if isinstance(node, ast.AnnAssign) and not ast.unparse(node.annotation).endswith(RECORDS):
@@ -58,12 +83,12 @@ def _texts(docstring: str) -> dict[str, str]:
 
 
 def numbers_without_a_source(root: Path) -> list[str]:
-    return [each.name for each in entries(root) if not SOURCE.search(each.text)]
+    return [each.name for each in every_entry(root) if not SOURCE.search(each.text)]
 
 
 def unknown_measurements(root: Path) -> list[str]:
     found = []
-    for each in entries(root):
+    for each in every_entry(root):
         rules = [rule for rule in re.findall(r'rule "([^"]+)"', each.text) if rule not in BY_NAME]
         modules = [name for name in re.findall(r"python -m ([\w.]+)", each.text) if find_spec(name) is None]
         found += [f"{each.name}: {name}" for name in (*rules, *modules)]
@@ -72,7 +97,7 @@ def unknown_measurements(root: Path) -> list[str]:
 
 @pytest.mark.parametrize("rule", [numbers_without_a_source, unknown_measurements])
 def test_every_limit_names_its_source(rule: Callable[[Path], list[str]]) -> None:
-    assert len(list(entries(ROOT))) > 100
+    assert len(list(entries(ROOT))) > 10 and len(list(entries_in_cpp(ROOT))) > 150
     assert not rule(ROOT)
 
 
@@ -102,8 +127,28 @@ class StageLimits(NamedTuple):
 ''',
         encoding="utf-8",
     )
-    assert numbers_without_a_source(tmp_path) == ["stage.py StageLimits.share", "stage.py StageLimits.absent"]
+    (tmp_path / "extractor" / "native").mkdir()
+    (tmp_path / "extractor" / "native" / "stage.hpp").write_text(
+        """
+// Limits.
+struct LoopLimits {
+  // px, of a
+  // cell. Chosen.
+  double least = 1.0, most = 2.0;
+  double share = 0.5;  // of cells in view.
+  Index rounds = 3;  // Measured: rule "no rule".
+  OtherLimits other;
+};
+""",
+        encoding="utf-8",
+    )
+    assert numbers_without_a_source(tmp_path) == [
+        "stage.py StageLimits.share",
+        "stage.py StageLimits.absent",
+        "stage.hpp LoopLimits.share",
+    ]
     assert unknown_measurements(tmp_path) == [
         "stage.py StageLimits.turn: no such rule",
         "stage.py StageLimits.wait: benchmarks.nothing",
+        "stage.hpp LoopLimits.rounds: no rule",
     ]

@@ -1,5 +1,5 @@
 // Arrays with named dimensions: views over memory that belongs to somebody else, and arrays that own their
-// memory.
+// memory. Records of them cross to Python by the names of their fields.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,18 @@
 #include <cstdlib>
 #include <initializer_list>
 #include <memory>
+#include <tuple>
 #include <type_traits>
+
+// Within a struct: its fields in one list, by whose names Python's objects are read.
+#define CMP_FIELDS(...)                                \
+  static constexpr const char FIELDS[] = #__VA_ARGS__; \
+  auto fields() { return std::tie(__VA_ARGS__); }
+
+// The same for a struct that is returned as an object of a class in Python: its module and name.
+#define CMP_RECORD(python_class, ...)                  \
+  static constexpr const char PYTHON[] = python_class; \
+  CMP_FIELDS(__VA_ARGS__)
 
 namespace cmp {
 

@@ -1,9 +1,9 @@
 // The border to Python: arrays are checked, not converted; results own their memory; loops run without the
 // GIL.
 //
-// A function takes views, records of views, numbers and booleans, and returns an array, a number or a tuple
-// of these. A record is a struct with `static Record read(const Fields&)`, which reads a Python object's
-// attributes by name.
+// A function takes views, records, numbers and booleans, and returns an array, a number, a record or a tuple
+// of these. A record crosses by the names of its fields (CMP_FIELDS or CMP_RECORD of base/array.hpp). Other
+// structs are thresholds: they stay here, and a function takes their defaults.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -12,8 +12,8 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <tuple>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -43,7 +43,6 @@ class Borrowed {
     for (Py_buffer& buffer : buffers_) PyBuffer_Release(&buffer);
   }
   const Py_buffer& add(PyObject* object, bool is_written, const Name& name) {
-    note_changeable();
     Py_buffer& buffer = buffers_.emplace_back();
     int flags = PyBUF_STRIDES | PyBUF_FORMAT | (is_written ? PyBUF_WRITABLE : 0);
     if (PyObject_GetBuffer(object, &buffer, flags) != 0) {
@@ -56,16 +55,9 @@ class Borrowed {
   }
   void keep(nb::object object) { objects_.push_back(std::move(object)); }
 
-  // Notes that something was read that may change later: an array, or an object that is no tuple.
-  void note_changeable() { ++changeable_; }
-  std::size_t changeable() const { return changeable_; }
-  // Notes that nothing that was read since there were `before` such things will change.
-  void note_lasting(std::size_t before) { changeable_ = before; }
-
  private:
   std::vector<Py_buffer> buffers_;
   std::vector<nb::object> objects_;
-  std::size_t changeable_ = 0;
 };
 
 template <class T>
@@ -102,10 +94,8 @@ struct FromPython<View<T, N>> {
   using Value = std::remove_const_t<T>;
 
   static View<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
-    if (const NumpyArray* array = fitting_array(object.ptr())) {
-      borrowed.note_changeable();
+    if (const NumpyArray* array = fitting_array(object.ptr()))
       return strided({reinterpret_cast<T*>(array->data), array->shape, array->strides}, name);
-    }
     const Py_buffer& buffer = borrowed.add(object.ptr(), !std::is_const_v<T>, name);
     if (buffer.ndim != N || !has_dtype<Value>(buffer)) refuse(buffer, name);
     return strided({static_cast<T*>(buffer.buf), buffer.shape, buffer.strides}, name);
@@ -178,7 +168,7 @@ struct FromPython<T> {
   }
 };
 
-// A field of a Python object, which becomes whatever C++ value it is given to.
+// -- to be removed with the last record of this kind
 class Field {
  public:
   Field(nb::object value, Name name, Borrowed& borrowed)
@@ -194,62 +184,101 @@ class Field {
   Borrowed& borrowed_;
 };
 
-// The attributes of a Python object.
 class Fields {
  public:
   Fields(nb::handle object, const Name& name, Borrowed& borrowed)
       : object_(object), name_(name), borrowed_(borrowed) {}
   Field operator[](const char* field) const {
-    PyObject* value = PyObject_GetAttr(object_.ptr(), interned(field));
-    if (value == nullptr) {
-      PyErr_Clear();
-      throw nb::type_error((name_.text() + " has no field " + field).c_str());
-    }
-    nb::object owned = nb::steal(value);
-    borrowed_.keep(owned);  // a property may have made its array for this call
-    return {owned, Name{&name_, field}, borrowed_};
+    return {nb::object(object_.attr(field)), Name{&name_, field}, borrowed_};
   }
 
  private:
-  // The Python text of a literal, made once.
-  static PyObject* interned(const char* literal) {
-    static std::unordered_map<const char*, PyObject*> texts;
-    PyObject*& text = texts[literal];
-    if (text == nullptr) text = PyUnicode_InternFromString(literal);
-    return text;
-  }
-
   nb::handle object_;
   const Name& name_;
   Borrowed& borrowed_;
 };
 
 template <class T>
-concept Record = requires(const Fields& fields) {
+concept OldRecord = requires(const Fields& fields) {
   { T::read(fields) } -> std::same_as<T>;
 };
+
+template <OldRecord T>
+struct FromPython<T> {
+  static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    return T::read(Fields(object, name, borrowed));
+  }
+};
+// --
+
+template <class T>
+concept Record = requires { T::FIELDS; };
+
+// A record that Python has a class of.
+template <class T>
+concept NamedRecord = Record<T> && requires { T::PYTHON; };
 
 // A record of tables that are made once, as those of a layout; their arrays keep their shape.
 template <class T>
 concept Lasting = Record<T> && T::is_lasting;
 
 template <Record T>
-struct FromPython<T> {
-  // A tuple of nothing but numbers and such tuples, as limits are, is read once; so is one of lasting tables.
-  static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
-    static PyObject* last = nullptr;  // is kept, so that no other object gets its address
-    static std::optional<T> record;
-    if (object.ptr() == last) return *record;
-    if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
-    const std::size_t before = borrowed.changeable();
-    T found = T::read(Fields(object, name, borrowed));
-    if constexpr (Lasting<T>) borrowed.note_lasting(before);
-    if (PyTuple_Check(object.ptr()) != 0 && borrowed.changeable() == before) {
-      record.emplace(found);
-      // given back last, as that may run code that reads a record
-      const nb::object former = nb::steal(std::exchange(last, object.inc_ref().ptr()));
+constexpr std::size_t FIELD_COUNT = std::tuple_size_v<decltype(std::declval<T&>().fields())>;
+
+// The names of a record's fields as a tuple of Python's texts, made once.
+template <Record T>
+PyObject* field_names() {
+  static PyObject* const names = [] {
+    PyObject* made = PyTuple_New(FIELD_COUNT<T>);
+    std::string_view left = T::FIELDS;
+    for (std::size_t k = 0; k < FIELD_COUNT<T>; ++k) {
+      const std::string_view name = left.substr(0, left.find(','));
+      PyTuple_SET_ITEM(made, k, PyUnicode_InternFromString(std::string(name).c_str()));
+      left.remove_prefix(std::min(name.size() + 2, left.size()));
     }
-    return found;
+    return made;
+  }();
+  return names;
+}
+
+template <Record T>
+struct FromPython<T> {
+  static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    if constexpr (!Lasting<T>) {
+      return read(object, name, borrowed);
+    } else {
+      static PyObject* last = nullptr;  // is kept, so that no other object gets its address
+      static T record;
+      if (object.ptr() == last) return record;
+      const T found = read(object, name, borrowed);
+      if (PyTuple_Check(object.ptr()) != 0) {  // whose fields do not change
+        record = found;
+        // given back last, as that may run code that reads a record
+        const nb::object former = nb::steal(std::exchange(last, object.inc_ref().ptr()));
+      }
+      return found;
+    }
+  }
+
+ private:
+  static T read(nb::handle object, const Name& name, Borrowed& borrowed) {
+    T record{};
+    int k = 0;
+    std::apply([&](auto&... field) { (update(field, object, k++, name, borrowed), ...); }, record.fields());
+    return record;
+  }
+
+  template <class Field>
+  static void update(Field& field, nb::handle object, int k, const Name& name, Borrowed& borrowed) {
+    PyObject* const text = PyTuple_GET_ITEM(field_names<T>(), k);
+    const char* own = PyUnicode_AsUTF8(text);
+    nb::object value = nb::steal(PyObject_GetAttr(object.ptr(), text));
+    if (!value.is_valid()) {
+      PyErr_Clear();
+      throw nb::type_error((name.text() + " has no field " + own).c_str());
+    }
+    field = FromPython<Field>::get(value, Name{&name, own}, borrowed);
+    borrowed.keep(std::move(value));  // a property may have made its array for this call
   }
 };
 
@@ -258,7 +287,6 @@ template <class T, std::size_t N>
 struct FromPython<std::array<T, N>> {
   static std::array<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
     std::array<T, N> values;
-    if (PyTuple_Check(object.ptr()) == 0) borrowed.note_changeable();
     if (PySequence_Check(object.ptr()) == 0 || nb::len(object) != N)
       throw nb::type_error((name.text() + " must have " + std::to_string(N) + " items").c_str());
     for (std::size_t k = 0; k < N; ++k) {
@@ -288,11 +316,74 @@ nb::object to_python(T value) {
   return nb::cast(value);
 }
 
+// A record as an object of its class in Python, made with the names of the fields.
+template <NamedRecord T>
+nb::object to_python(T&& record) {
+  static PyObject* made_class = nullptr;  // found at first use: its module imports this one
+  if (made_class == nullptr) {
+    const std::string_view path = T::PYTHON;
+    const std::size_t dot = path.rfind('.');
+    nb::object module = nb::module_::import_(std::string(path.substr(0, dot)).c_str());
+    made_class = PyObject_GetAttrString(module.ptr(), path.data() + dot + 1);
+    if (made_class == nullptr) throw nb::python_error();
+  }
+  auto values = std::apply(
+      [](auto&... field) { return std::array<nb::object, FIELD_COUNT<T>>{to_python(std::move(field))...}; },
+      record.fields());
+  std::array<PyObject*, FIELD_COUNT<T>> items;
+  for (std::size_t k = 0; k < items.size(); ++k) items[k] = values[k].ptr();
+  PyObject* object = PyObject_Vectorcall(made_class, items.data(), 0, field_names<T>());
+  if (object == nullptr) throw nb::python_error();
+  return nb::steal(object);
+}
+
 template <class... T>
 nb::object to_python(std::tuple<T...>&& values) {
   return std::apply([](auto&&... value) { return nb::make_tuple(to_python(std::move(value))...); },
                     std::move(values));
 }
+
+// The name of a type in signatures.
+template <class T>
+struct TypeName {
+  static std::string get() {
+    if constexpr (NamedRecord<T>)
+      return T::PYTHON;
+    else if constexpr (std::is_same_v<T, bool>)
+      return "bool";
+    else if constexpr (std::is_floating_point_v<T>)
+      return "float";
+    else if constexpr (std::is_integral_v<T>)
+      return "int";
+    else
+      return std::is_void_v<T> ? "None" : "typing.Any";
+  }
+};
+
+template <class T, int N>
+struct TypeName<View<T, N>> {
+  static std::string get() {
+    const std::string name = dtype_name<std::remove_const_t<T>>();
+    return "numpy.typing.NDArray[numpy." + name + (name == "bool" ? "_]" : "]");
+  }
+};
+
+template <class T, int N>
+struct TypeName<Array<T, N>> : TypeName<View<T, N>> {};
+
+template <class T, std::size_t N>
+struct TypeName<std::array<T, N>> {
+  static std::string get() { return "collections.abc.Sequence[" + TypeName<T>::get() + "]"; }
+};
+
+template <class... T>
+struct TypeName<std::tuple<T...>> {
+  static std::string get() {
+    std::string names;
+    ((names += (names.empty() ? "" : ", ") + TypeName<T>::get()), ...);
+    return "tuple[" + names + "]";
+  }
+};
 
 // Refuses to go on where the processor lacks the instructions that the loops were compiled for.
 inline void require_processor() {
@@ -304,27 +395,59 @@ inline void require_processor() {
 #endif
 }
 
+template <class T>
+concept Thresholds = std::is_class_v<T> && !requires { &FromPython<T>::get; };
+
 template <auto F, class Signature>
 struct Bound;
 
 template <auto F, class Result, class... Arguments>
 struct Bound<F, Result (*)(Arguments...)> {
-  static constexpr std::size_t COUNT = sizeof...(Arguments);
+  static constexpr std::size_t COUNT = (std::size_t{!Thresholds<std::remove_cvref_t<Arguments>>} + ... + 0);
   using Names = std::array<const char*, COUNT>;
 
-  static nb::object call(const char* function, const Names& names, const nb::args& given) {
-    if (given.size() != COUNT)
-      throw nb::type_error(
-          (std::string(function) + " takes " + std::to_string(COUNT) + " arguments").c_str());
-    return call(names, given, std::index_sequence_for<Arguments...>());
+  static void add(nb::module_& module, const char* name, const Names& names) {
+    add(module, name, names, std::make_index_sequence<COUNT>(), std::index_sequence_for<Arguments...>());
   }
 
  private:
+  using Given = std::array<nb::handle, COUNT>;
+  template <std::size_t>
+  using Handle = nb::handle;
+
+  // The place of each argument among those that Python gives.
+  static constexpr auto PLACES = [] {
+    std::array<std::size_t, sizeof...(Arguments)> places{};
+    std::size_t k = 0, given = 0;
+    ((places[k++] = given, given += !Thresholds<std::remove_cvref_t<Arguments>>), ...);
+    return places;
+  }();
+
+  template <std::size_t... G, std::size_t... K>
+  static void add(nb::module_& module, const char* name, const Names& names, std::index_sequence<G...>,
+                  std::index_sequence<K...> all) {
+    const std::string parameters =
+        (std::string() + ... + parameter<std::remove_cvref_t<Arguments>>(names, K));
+    const std::string signature =
+        "def " + std::string(name) + "(" + parameters + ") -> " + TypeName<Result>::get();
+    module.def(
+        name, [names, all](Handle<G>... given) { return call(names, Given{given...}, all); },
+        nb::arg(names[G])..., nb::sig(signature.c_str()));
+  }
+
+  template <class T>
+  static std::string parameter(const Names& names, std::size_t k) {
+    if constexpr (Thresholds<T>)
+      return "";
+    else
+      return (PLACES[k] == 0 ? "" : ", ") + (names[PLACES[k]] + (": " + TypeName<T>::get()));
+  }
+
   template <std::size_t... K>
-  static nb::object call(const Names& names, const nb::args& given, std::index_sequence<K...>) {
+  static nb::object call(const Names& names, const Given& given, std::index_sequence<K...>) {
     Borrowed borrowed;
     std::tuple<std::remove_cvref_t<Arguments>...> values{
-        FromPython<std::remove_cvref_t<Arguments>>::get(given[K], Name{nullptr, names[K]}, borrowed)...};
+        value<std::remove_cvref_t<Arguments>>(names, given, K, borrowed)...};
     if constexpr (std::is_void_v<Result>) {
       nb::gil_scoped_release released;
       F(std::get<K>(values)...);
@@ -337,14 +460,21 @@ struct Bound<F, Result (*)(Arguments...)> {
     }
     return nb::none();
   }
+
+  template <class T>
+  static T value(const Names& names, const Given& given, std::size_t k, Borrowed& borrowed) {
+    if constexpr (Thresholds<T>)
+      return T{};
+    else
+      return FromPython<T>::get(given[PLACES[k]], Name{nullptr, names[PLACES[k]]}, borrowed);
+  }
 };
 
-// Makes a function known to Python under a name, with the names of its arguments.
+// Makes a function known to Python under a name, with the names of its arguments but for thresholds.
 template <auto F>
 void bind(nb::module_& module, const char* name, typename Bound<F, decltype(F)>::Names names) {
   Numpy::get();  // imported here, as an import within a call could wait for another thread
-  module.def(
-      name, [name, names](const nb::args& given) { return Bound<F, decltype(F)>::call(name, names, given); });
+  Bound<F, decltype(F)>::add(module, name, names);
 }
 
 }  // namespace cmp

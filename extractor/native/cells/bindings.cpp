@@ -10,13 +10,11 @@
 namespace cmp::cells {
 
 void add_cells(nb::module_ module) {
-  bind<&find_candidates>(
-      module, "find_candidates",
-      {"image", "maps", "shares", "center", "area", "corner", "quality", "share", "limits"});
-  bind<&grow>(module, "grow", {"hsv", "seed_xy", "limit_px", "limits"});
-  bind<&fit_to_moments>(module, "fit_to_moments", {"moments", "seed", "limits"});
-  bind<&update_triangle_corners>(module, "update_triangle_corners", {"view", "corners", "good", "limits"});
-  bind<&link_cells>(module, "link_cells", {"center", "corner", "limits"});
+  bind<&find_candidates>(module, "find_candidates", {"image", "maps", "shares", "known", "tile_px"});
+  bind<&grow>(module, "grow", {"hsv", "seed_xy", "limit_px"});
+  bind<&fit_to_moments>(module, "fit_to_moments", {"moments", "seed"});
+  bind<&update_triangle_corners>(module, "update_triangle_corners", {"view", "corners", "good"});
+  bind<&link_cells>(module, "link_cells", {"center", "corner"});
 }
 
 }  // namespace cmp::cells

@@ -67,13 +67,14 @@ double own_share(const image::ContrastMap& map, const MomentShape& shape, double
 
 // The triangles of some maps at some levels.
 std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
-                                     View<const double, 1> shares, const CandidateLimits& limits) {
+                                     View<const double, 1> shares, Index tile_px,
+                                     const CandidateLimits& limits) {
   std::vector<Candidate> all;
   const auto channels = image::smoothed_channels(image);
   const double least = limits.min_contrast_deviations * std::max(image::smoothed_noise(channels), 0.3);
   const double most = limits.max_area_share * static_cast<double>(image.size(0) * image.size(1));
   for (const std::int64_t number : maps) {
-    const auto map = image::contrast_map(channels, number, limits.tile_px);
+    const auto map = image::contrast_map(channels, number, tile_px);
     for (const double share : shares)
       for (const MomentSums& sums : level_regions(map, share, least, limits.min_area_px, most)) {
         const MomentShape shape = shape_of(sums);
@@ -91,15 +92,14 @@ std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, View<con
 
 }  // namespace
 
-FoundCandidates find_candidates(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
-                                View<const double, 1> shares, View<const double, 2> center,
-                                View<const double, 1> area, View<const double, 3> corner,
-                                View<const double, 1> quality, View<const double, 1> share,
-                                const CandidateLimits& limits) {
-  std::vector<Candidate> all = candidates_of(image, maps, shares, limits);
-  for (Index i = 0; i < center.size(); ++i) {
-    Candidate one{center(i, 0), center(i, 1), area[i], quality[i], share[i], {}};
-    for (Index k = 0; k < 6; ++k) one.corner[k] = corner(i, k / 2, k % 2);
+FoundCells find_candidates(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
+                           View<const double, 1> shares, const KnownCells& known, Index tile_px,
+                           const CandidateLimits& limits) {
+  std::vector<Candidate> all = candidates_of(image, maps, shares, tile_px, limits);
+  for (Index i = 0; i < known.area_px.size(); ++i) {
+    Candidate one{known.center_px(i, 0), known.center_px(i, 1), known.area_px[i],
+                  known.quality[i],      known.share[i],        {}};
+    for (Index k = 0; k < 6; ++k) one.corner[k] = known.corner_px(i, k / 2, k % 2);
     all.push_back(one);
   }
   std::stable_sort(all.begin(), all.end(),
@@ -115,14 +115,12 @@ FoundCandidates find_candidates(View<const std::uint8_t, 3> image, View<const st
     kept.push_back(&one);
   }
   const auto number = static_cast<Index>(kept.size());
-  FoundCandidates out{Array<double, 2>({number, 2}), Array<double, 1>({number}),
-                      Array<double, 3>({number, 3, 2}), Array<double, 1>({number}),
-                      Array<double, 1>({number})};
-  auto& [centers, areas, corners, qualities, levels] = out;
+  FoundCells out{Array<double, 2>({number, 2}), Array<double, 1>({number}), Array<double, 3>({number, 3, 2}),
+                 Array<double, 1>({number}), Array<double, 1>({number})};
   for (Index i = 0; i < number; ++i) {
-    centers(i, 0) = kept[i]->x, centers(i, 1) = kept[i]->y;
-    areas[i] = kept[i]->area, qualities[i] = kept[i]->quality, levels[i] = kept[i]->share;
-    for (Index k = 0; k < 6; ++k) corners(i, k / 2, k % 2) = kept[i]->corner[k];
+    out.center_px(i, 0) = kept[i]->x, out.center_px(i, 1) = kept[i]->y;
+    out.area_px[i] = kept[i]->area, out.quality[i] = kept[i]->quality, out.share[i] = kept[i]->share;
+    for (Index k = 0; k < 6; ++k) out.corner_px(i, k / 2, k % 2) = kept[i]->corner[k];
   }
   return out;
 }

@@ -58,15 +58,14 @@ class Triangles {
     std::vector<Contact> out;
     for (Index point = 0; point < points_.size(); ++point) {
       const Index i = point / CORNERS;
-      numeric::for_points_within(
-          grid, points_(point, 0), points_(point, 1), tolerance * edge_[i],
-          [&](std::int32_t near, double square) {
-            const Index other = near / CORNERS;
-            const double reach = tolerance * edge_[other];
-            if (other != i && square < reach * reach)
-              add_contact(out, i, static_cast<int>(point % CORNERS), other, near % CORNERS,
-                          direction_tolerance);
-          });
+      numeric::for_points_within(grid, points_(point, 0), points_(point, 1), tolerance * edge_[i],
+                                 [&](std::int32_t near, double square) {
+                                   const Index other = near / CORNERS;
+                                   const double reach = tolerance * edge_[other];
+                                   if (other != i && square < reach * reach)
+                                     add_contact(out, i, static_cast<int>(point % CORNERS), other,
+                                                 near % CORNERS, direction_tolerance);
+                                 });
     }
     return out;
   }
@@ -160,8 +159,8 @@ double swelling_of(const Triangles& triangles, const MutualContacts& contacts, I
 
 }  // namespace
 
-CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
-                     const CellMeshLimits& limits) {
+LinkedCells link_cells(View<const double, 2> center, View<const double, 3> corner,
+                       const CellMeshLimits& limits) {
   const Index count = center.size();
   Array<std::int32_t, 2> neighbours({count, STEPS}, -1);
   Array<std::int8_t, 2> back({count, STEPS}, std::int8_t{-1});
@@ -183,7 +182,7 @@ CellLinks link_cells(View<const double, 2> center, View<const double, 3> corner,
         misfit(i, k) = mutual.misfit(i, k);
       }
   }
-  return {std::move(neighbours), std::move(back), std::move(misfit), swelling};
+  return {CellLinks{std::move(neighbours), std::move(back), std::move(misfit)}, swelling};
 }
 
 }  // namespace cmp::cells

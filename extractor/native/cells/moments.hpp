@@ -85,9 +85,13 @@ inline void fill_corners(const MomentShape& shape, View<double, 2> corners) {
   }
 }
 
-// The limits of a triangle's shape; extractor/cells/cells.py explains them.
+// Limits of the shapes of triangles.
 struct ShapeLimits {
-  double max_elongation, min_solidity, max_solidity, ragged_weight;
+  double max_elongation = 13.0;  // (trace of the covariance)^2 / determinant; 4 is equilateral. Chosen.
+  // area over the root of the determinant of the covariance, relative to a triangle's; an ellipse has 1.21,
+  // ragged regions have less. Chosen.
+  double min_solidity = 0.7, max_solidity = 1.25;
+  double ragged_weight = 1.5;  // of the difference between solidity and 1 in the quality of a shape. Chosen.
 
   // How much a region is a triangle: 1 at best, a little for a blurred one; negative for other shapes.
   double quality(const MomentShape& shape) const {
@@ -95,11 +99,6 @@ struct ShapeLimits {
                              shape.solidity <= max_solidity;
     return is_triangle ? std::min(shape.triangularity, 1.0) - ragged_weight * std::abs(shape.solidity - 1.0)
                        : -1.0;
-  }
-
-  template <class F>
-  static ShapeLimits read(const F& f) {
-    return {f["max_elongation"], f["min_solidity"], f["max_solidity"], f["ragged_weight"]};
   }
 };
 

@@ -8,14 +8,11 @@
 
 namespace cmp::cells {
 
-// The limits of growing; the Python module explains them.
+// The limit of growing.
 struct GrowLimits {
-  double threshold;
-
-  template <class F>
-  static GrowLimits read(const F& f) {
-    return {f["threshold"]};
-  }
+  // of eq. 3 over OpenCV's 8-bit HSV, below which a pixel belongs to the region; as in the article.
+  // Published: the article, below eq. 3.
+  double threshold = 0.15;
 };
 
 using GrownRegions = std::tuple<Array<std::int32_t, 2>, Array<double, 2>>;

@@ -6,34 +6,40 @@
 
 namespace cmp::cells {
 
-// The limits of the measurement; the Python module explains them.
+// Limits of the measurement of edges.
 struct TriangleEdgeLimits {
-  double first_profile;
-  std::int64_t half_profile;
-  double border_margin_px;
-  double profile_reach;
-  double fine_reach_px;
-  double next_reach;
-  std::int64_t max_passes;
-  double ink_radius;
-  double background_place;
-  double background_radius;
-  double min_depth_px;
-  double min_contrast;
-  double min_sine;
-  double max_corner_shift;
-  double min_profile_level;
-  double max_profile_level;
-  double smallest_contrast;
-
-  template <class F>
-  static TriangleEdgeLimits read(const F& f) {
-    return {f["first_profile"],    f["half_profile"],      f["border_margin_px"],  f["profile_reach"],
-            f["fine_reach_px"],    f["next_reach"],        f["max_passes"],        f["ink_radius"],
-            f["background_place"], f["background_radius"], f["min_depth_px"],      f["min_contrast"],
-            f["min_sine"],         f["max_corner_shift"],  f["min_profile_level"], f["max_profile_level"],
-            f["smallest_contrast"]};
-  }
+  // of an edge, from its start to the first profile, and from the second one to its end. Chosen.
+  double first_profile = 0.25;
+  std::int64_t half_profile = 4;  // samples on each side of an edge. Chosen.
+  // from profiles to the last row and column; more than half a sub-pixel step. Derived.
+  double border_margin_px = 0.01;
+  // half length of a profile in the first pass, in vectors from the cell's center to the edge's middle.
+  // Chosen.
+  double profile_reach = 0.5;
+  // half length of a profile, about; longer profiles are followed by shorter ones. Measured: rule "shorter
+  // profiles".
+  double fine_reach_px = 8.0;
+  // half length of a profile, relative to the pass before. Measured: rule "shorter profiles".
+  double next_reach = 0.25;
+  // the first one and those with shorter profiles. Measured: rule "shorter profiles".
+  std::int64_t max_passes = 3;
+  // of the disc in which the ink's color is measured, relative to the corner's distance from the center.
+  // Chosen.
+  double ink_radius = 0.2;
+  // of the disc of the color outside an edge, in vectors from the cell's center to the edge's middle.
+  // Derived: the middle of a neighbour as large.
+  double background_place = 2.0;
+  double background_radius = 0.4;  // of this disc, relative to the edge's distance from the center. Chosen.
+  double min_depth_px = 0.3;       // distance of a valid edge from the cell's center. Chosen.
+  // norm over the three 8-bit channels, between the ink and the color outside a valid edge. Chosen.
+  double min_contrast = 12.0;
+  double min_sine = 0.05;  // two edges that meet at less than 3 degrees have no corner. Chosen.
+  // of a valid triangle, in units of the corner's distance from the center. Chosen.
+  double max_corner_shift = 1.0;
+  // to which a profile's share of ink is limited. Chosen.
+  double min_profile_level = -0.2, max_profile_level = 1.2;
+  // of a squared contrast, to divide by. Derived: it only keeps a division from failing.
+  double smallest_contrast = 1e-9;
 };
 
 // Moves the corners of triangles to the intersections of their measured edges.

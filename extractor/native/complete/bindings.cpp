@@ -22,9 +22,10 @@ std::tuple<Array<double, 2>, Array<double, 1>, Array<double, 1>> places_by_layer
 void add_complete(nb::module_ module) {
   bind<&places_by_layer>(module, "predict_by_layer", {"xy", "noise_px2", "layers", "limits"});
   bind<&repair_markers>(module, "repair_markers", {"refined", "places", "tables", "size", "limits"});
-  bind<&locate_on_edges>(module, "locate_on_edges", {"markers", "scatter", "topology", "points", "limits"});
+  bind<&locate_on_edges>(module, "locate_on_edges", {"markers", "scatter", "topology", "points"});
   bind<&measure_jumps>(module, "measure_jumps", {"markers", "topology", "limits"});
-  bind<&measure_numbered>(module, "measure_numbered", {"view", "cells", "xy", "edges", "limits"});
+  bind<&measure_numbered>(module, "measure_numbered", {"view", "cells", "xy", "edges"});
+  module.attr("CLIPPED_VALUE") = QualityLimits{}.clipped_value;
 }
 
 }  // namespace cmp::complete

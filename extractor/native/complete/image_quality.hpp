@@ -9,16 +9,14 @@
 
 namespace cmp::complete {
 
-// Limits of the quality; explained in extractor/complete/image_quality.py.
+// Limits of the quality.
 struct QualityLimits {
-  double clipped_value, dim_quantile, sample_radius;
+  // of 255, from which on a cell's mean is clipped; noise pulls it below 255. Chosen.
+  double clipped_value = 253.0;
+  double dim_quantile = 0.05;  // of the cells' light, that is the dimmest; the brightest are as many. Chosen.
+  double sample_radius = 0.08;  // in edges, over which a cell's color is averaged. Chosen.
   image::NoiseLimits noise;
   refine::GridlineWeightLimits gridlines;
-
-  template <class F>
-  static QualityLimits read(const F& f) {
-    return {f["clipped_value"], f["dim_quantile"], f["sample_radius"], f["noise"], f["gridlines"]};
-  }
 };
 
 // The cells of a layout at which the quality is measured.
@@ -26,14 +24,17 @@ struct SampledCells {
   View<const std::int32_t, 2> corners;  // (K, 3) marker ids
   View<const std::uint8_t, 1> color;    // (K,) red 0, green 1, blue 2, black 3
 
-  template <class F>
-  static SampledCells read(const F& f) {
-    return {f["corners"], f["color"]};
-  }
+  CMP_RECORD("extractor.complete.image_quality.SampledCells", corners, color)
 };
 
-// The fields of CellFigures.
-using CellFigures = std::tuple<double, Index, Index, double, double>;
+// The figures at the middles of cells; contrast, clipping and evenness are NaN where no cell was measured.
+struct CellFigures {
+  double contrast;
+  Index one, other;  // the two inks that differ least
+  double clipping, evenness;
+
+  CMP_RECORD("extractor.complete.image_quality.CellFigures", contrast, one, other, clipping, evenness)
+};
 
 // The figures of numbered markers (M, 2) px, NaN where lost; the noise, and the median length of the edges
 // (E, 2).

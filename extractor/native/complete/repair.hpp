@@ -49,10 +49,7 @@ struct RefinedMarkers {
   View<const double, 3> cov_px2;  // (M, 2, 2) NaN where not measured
   View<const bool, 1> explained;  // (M,) synthesis explains the image around the marker
 
-  template <class F>
-  static RefinedMarkers read(const F& f) {
-    return {f["xy_px"], f["cov_px2"], f["explained"]};
-  }
+  CMP_RECORD("extractor.refine.estimate.RefinedMarkers", xy_px, cov_px2, explained)
 };
 
 // xy_px, cov_px2 and status of RepairedMarkers.

@@ -13,15 +13,13 @@
 
 namespace cmp::complete {
 
-// Limits of virtual markers; explained in extractor/complete/virtual_markers.py.
+// Limits of virtual markers.
 struct VirtualLimits {
-  double max_measured_offset, bend_uncertainty;
+  // in edges, of a measured point from the interpolated one; larger offsets are dirt. Chosen.
+  double max_measured_offset = 0.08;
+  // deviation of the interpolated point, as a share of its distance from the chord. Chosen.
+  double bend_uncertainty = 0.05;
   refine::GridlineLimits gridlines;
-
-  template <class F>
-  static VirtualLimits read(const F& f) {
-    return {f["max_measured_offset"], f["bend_uncertainty"], f["gridlines"]};
-  }
 };
 
 // The M markers between which virtual ones lie.
@@ -30,14 +28,16 @@ struct LocatedMarkers {
   View<const double, 3> cov_px2;       // (M, 2, 2) NaN where lost
   View<const std::uint8_t, 1> status;  // (M,)
 
-  template <class F>
-  static LocatedMarkers read(const F& f) {
-    return {f["xy_px"], f["cov_px2"], f["status"]};
-  }
+  CMP_RECORD("extractor.complete.repair.RepairedMarkers", xy_px, cov_px2, status)
 };
 
-// (E, m, 2) px and (E, m, 2, 2) px^2, NaN where lost; (E, m) the status.
-using VirtualMarkers = std::tuple<Array<double, 3>, Array<double, 4>, Array<std::uint8_t, 2>>;
+struct VirtualMarkers {
+  Array<double, 3> xy_px;         // (E, m, 2)
+  Array<double, 4> cov_px2;       // (E, m, 2, 2)
+  Array<std::uint8_t, 2> status;  // (E, m)
+
+  CMP_RECORD("extractor.result.VirtualMarkers", xy_px, cov_px2, status)
+};
 
 // The m virtual markers on each of E edges.
 //

@@ -7,7 +7,7 @@
 namespace cmp::image {
 
 void add_image(nb::module_ module) {
-  bind<&estimate_noise>(module, "estimate_noise", {"image", "xy", "cells", "limits"});
+  bind<&estimate_noise>(module, "estimate_noise", {"image", "xy", "cells"});
   bind<&block_means>(module, "block_means", {"image", "scale", "light_steps", "value_of_steps"});
 }
 

@@ -5,14 +5,9 @@
 
 namespace cmp::image {
 
-// The limits of the estimate of noise; the Python module explains them.
+// Limits of the estimate of the noise.
 struct NoiseLimits {
-  std::int64_t samples;
-
-  template <class F>
-  static NoiseLimits read(const F& f) {
-    return {f["samples"]};
-  }
+  std::int64_t samples = 600;  // pixels for the estimate; with fewer cells, several pixels in each. Chosen.
 };
 
 // Standard deviation of a channel's noise in gray levels (Immerkaer 1996, with a median for robustness); NaN

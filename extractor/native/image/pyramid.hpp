@@ -10,10 +10,7 @@ namespace cmp::image {
 struct PolynomialFrame {
   double x, y, scale;
 
-  template <class F>
-  static PolynomialFrame read(const F& f) {
-    return {f["x"], f["y"], f["scale"]};
-  }
+  CMP_FIELDS(x, y, scale)
 };
 
 // An image at 1/scale of the full size.
@@ -23,10 +20,7 @@ struct PyramidLevel {
   PolynomialFrame frame;              // the coordinates of polynomials over this image
   ResponseTables response;            // from values to light
 
-  template <class F>
-  static PyramidLevel read(const F& f) {
-    return {f["image"], f["scale"], f["frame"], f["response"]};
-  }
+  CMP_RECORD("extractor.image.pyramid.PyramidLevel", image, scale, frame, response)
 };
 
 // (H // scale, W // scale, 3): the values of the mean light of scale x scale pixels; image (H, W, 3).

@@ -23,10 +23,7 @@ struct ResponseTables {
   View<const std::uint16_t, 1> light_steps;    // (256,) the light of each value in LIGHT_STEPS steps
   View<const std::uint8_t, 1> value_of_steps;  // (LIGHT_STEPS,) the nearest value of the light of each step
 
-  template <class F>
-  static ResponseTables read(const F& f) {
-    return {f["light"], f["encoded"], f["light_steps"], f["value_of_steps"]};
-  }
+  CMP_RECORD("extractor.image.response.ResponseTables", light, encoded, light_steps, value_of_steps)
 };
 
 // The place of light's value in ResponseTables::encoded; the derivative follows there. Light beyond the table

@@ -19,10 +19,7 @@ struct LayoutCells {
   View<const std::int32_t, 2>
       cell_neighbours;  // (U, 6) cells that share a corner, by NEIGHBOUR_STEPS; -1 for none
 
-  template <class F>
-  static LayoutCells read(const F& f) {
-    return {f["center_mm"], f["ink"], f["size_mm"], f["corner_vectors_mm"], f["cell_neighbours"]};
-  }
+  CMP_FIELDS(center_mm, ink, size_mm, corner_vectors_mm, cell_neighbours)
 };
 
 // The neighbours of the layout's M markers; -1 for no neighbour.
@@ -35,10 +32,7 @@ struct RingTables {
   View<const bool, 1> present;              // (M,) the markers that touch a colored or white cell
   Index layers;
 
-  template <class F>
-  static RingTables read(const F& f) {
-    return {f["marker_mm"], f["neighbours"], f["ring_weights"], f["first_ring"], f["present"], f["layers"]};
-  }
+  CMP_FIELDS(marker_mm, neighbours, ring_weights, first_ring, present, layers)
 };
 
 // The layout's cell at the axial (q, r) in the table (S, S), or -1; branch-free, because cells are read in

@@ -35,26 +35,9 @@ struct Topology {
   // covariance with, and the variance of, that with second derivatives
   View<const double, 2> scatter_bending;
 
-  template <class F>
-  static Topology read(const F& f) {
-    return {f["edges"],
-            f["cells"],
-            f["cell_color"],
-            f["cell_edges"],
-            f["black_cells"],
-            f["edge_cells"],
-            f["spokes"],
-            f["ring_markers"],
-            f["ring_vectors"],
-            f["derivative_stencil"],
-            f["edge_vectors"],
-            f["next_markers"],
-            f["third_differences"],
-            f["next_edges"],
-            f["end_couplings"],
-            f["covariance_couplings"],
-            f["scatter_bending"]};
-  }
+  CMP_RECORD("extractor.layout.topology.Topology", edges, cells, cell_color, cell_edges, black_cells,
+             edge_cells, spokes, ring_markers, ring_vectors, derivative_stencil, edge_vectors, next_markers,
+             third_differences, next_edges, end_couplings, covariance_couplings, scatter_bending)
 };
 
 }  // namespace cmp::layout

@@ -5,9 +5,15 @@
 
 namespace cmp::localmap {
 
-// Limits of linear maps; explained in extractor/localmap/affine_maps.py.
+// Limits of linear maps.
 struct AffineMapLimits {
-  double min_spread, max_misfit, min_rival_misfit;
+  // least ratio of the neighbours' spread across to along; below it they lie on one line. Chosen.
+  double min_spread = 0.2;
+  // of the distance to a neighbour, from its center to the prediction by a triangle. Measured: rule "mapped
+  // by triangle".
+  double max_misfit = 0.3;
+  // the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances. Chosen below that.
+  double min_rival_misfit = 0.8;
 
   template <class F>
   static AffineMapLimits read(const F& f) {

@@ -15,10 +15,7 @@ struct MapPrior {
   double quadratic;  // of the terms of degree 2
   double cubic;      // of the terms of degree 3
 
-  template <class F>
-  static MapPrior read(const F& f) {
-    return {f["noise"], f["quadratic"], f["cubic"]};
-  }
+  CMP_FIELDS(noise, quadratic, cubic)
 };
 
 // Where coordinates of a map begin, and their units.

@@ -8,11 +8,16 @@
 
 namespace cmp::localmap {
 
-// Limits of regularised maps; explained in extractor/localmap/regularised_maps.py.
+// Limits of regularised maps.
 struct RegularisedMapLimits {
-  double min_sine2;
-  Index min_neighbours, min_curved_neighbours, min_firm_neighbours;
-  double firm_ridge, weak_ridge, linear_ridge;
+  double min_sine2 = 0.05;   // least squared sine of the angle between the neighbours' directions. Chosen.
+  Index min_neighbours = 2;  // known markers; fewer do not determine the slopes. Derived: two slopes.
+  Index min_curved_neighbours = 5;  // known markers; with fewer the map is linear. Derived: five derivatives.
+  // known markers; with fewer the curvature is held by weak_ridge. Chosen.
+  Index min_firm_neighbours = 8;
+  // added to the diagonal of the curvature's normal equations with enough neighbours, with some, and with too
+  // few; the unit is that of the layout's vectors. Chosen; the last one is so large that nothing curves.
+  double firm_ridge = 0.001, weak_ridge = 0.02, linear_ridge = 1e9;
 
   template <class F>
   static RegularisedMapLimits read(const F& f) {

@@ -32,10 +32,7 @@ struct WalkedCells {
   View<const std::int8_t, 1> first;   // (N,) the corner that is corner 0
   View<const std::int32_t, 1> part;   // (N,) the part, or -1
 
-  template <class F>
-  static WalkedCells read(const F& f) {
-    return {f["center_px"], f["corner_px"], f["axial"], f["first"], f["part"]};
-  }
+  CMP_FIELDS(center_px, corner_px, axial, first, part)
 };
 
 // (N, 3) the light (B, G, R, units of 1/255) of cells over that of the black cells that share their sides;

@@ -13,10 +13,7 @@ struct CellLinks {
   View<const std::int8_t, 2> back;         // (N, 6)
   View<const double, 2> misfit;            // (N, 6)
 
-  template <class F>
-  static CellLinks read(const F& f) {
-    return {f["neighbours"], f["back"], f["misfit"]};
-  }
+  CMP_FIELDS(neighbours, back, misfit)
 };
 
 // The limits of inks at links; the Python module explains them.

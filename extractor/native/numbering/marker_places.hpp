@@ -9,6 +9,11 @@
 
 namespace cmp::numbering {
 
+// In edges, of corners on which triangles agree, where gridlines bend. Chosen.
+inline constexpr double AGREED_DEVIATION = 0.04;
+// In edges, between a marker's place by its gridlines and a correct initial place. Chosen.
+inline constexpr double MAX_PLACE_ERROR = 0.1;
+
 // Limits of corners; explained in extractor/numbering/marker_places.py.
 struct CornerLimits {
   double max_corner_misfit, max_agreed_spread, predicted_weight;
@@ -26,10 +31,7 @@ struct TriangularCells {
   View<const double, 3>
       corner_px;  // (N, 3, 2) of the triangles, clockwise; NaN where the region is no triangle
 
-  template <class F>
-  static TriangularCells read(const F& f) {
-    return {f["center_px"], f["corner_px"]};
-  }
+  CMP_FIELDS(center_px, corner_px)
 };
 
 // The numbers of these cells.
@@ -37,10 +39,7 @@ struct CellNumbers {
   View<const std::int32_t, 1> cell;  // (N,) the layout's cell, or -1
   bool mirrored;                     // the pattern is seen from its back
 
-  template <class F>
-  static CellNumbers read(const F& f) {
-    return {f["cell"], f["mirrored"]};
-  }
+  CMP_FIELDS(cell, mirrored)
 };
 
 // Whether the triangles that agree at a marker are all that meet there, or at least two; and whether they are

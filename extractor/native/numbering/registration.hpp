@@ -29,10 +29,7 @@ struct RegisteredLayout {
   View<const std::int32_t, 1> white_pad;    // (W,) the pad of each, in ascending order
   View<const std::int32_t, 2> cell_lookup;  // (S, S), as Lattice.cell_lookup
 
-  template <class F>
-  static RegisteredLayout read(const F& f) {
-    return {f["axial"], f["white_axial"], f["white_pad"], f["cell_lookup"]};
-  }
+  CMP_FIELDS(axial, white_axial, white_pad, cell_lookup)
 };
 
 // The K best motions, the best first: (K, 3) turn, dq and dr; (K,) the pad; scores (K,), log odds; white

@@ -32,7 +32,7 @@ inline constexpr float EXP_END = 12.0F / EXP_POWER;  // exp(-12) counts as 0
 // The polynomial in z^2 for (N(z) - 0.5) / z, with an error of 3e-6 up to NORMAL_REACH: least squares over
 // z = NORMAL_REACH sin(t), t evenly spaced.
 inline constexpr float N0 = 0.39892966F, N1 = -0.06643246F, N2 = 0.009894961F, N3 = -0.0011384949F;
-inline constexpr float N4 = 9.8826655e-05F, N5 = -6.059199e-06F, N6 = 2.2961594e-07F, N7 = -3.970251e-09F;
+inline constexpr float N4 = 9.8826655e-05F, N5 = -6.059199e-06F, N6 = 2.2961594e-07F, N7 = -3.970251e-9F;
 // The cubic for exp(-x) up to EXP_END, whose power has an error of 1e-5: least squares, weighted by exp(-15
 // x), because the power multiplies an error by the other factors.
 inline constexpr float E0 = 0.9999989F, E1 = -0.9998702F, E2 = 0.49702352F, E3 = -0.146213F;

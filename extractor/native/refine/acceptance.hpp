@@ -5,48 +5,52 @@
 
 #include "base/array.hpp"
 #include "layout/topology.hpp"
+#include "numbering/marker_places.hpp"
 #include "refine/estimate.hpp"
+#include "refine/refinement_step.hpp"
 #include "refine/solve/fisher_information.hpp"
 
 namespace cmp::refine {
 
-// Limits of accepted markers; explained in extractor/refine/acceptance.py.
+// Limits of accepted markers, in units of the edges around the marker where nothing else is said.
 struct AcceptanceLimits {
-  double max_shift, max_shift_all_cells, max_deviation, min_information, bend_to_end_shift;
+  double max_shift = 0.25;  // from the start place. Chosen.
+  // the same where all triangles agree on that: in steep views these lie so far off. Chosen.
+  double max_shift_all_cells = 0.13;
+  // of what is measured. Chosen: as many markers at the rim are accepted as with 0.03, when their deviations
+  // were stated as if they had neighbours on all sides.
+  double max_deviation = 0.035;
+  // 1/px^2, below which a marker counts as unknown: four times that before the measurement. Derived.
+  double min_information = 4.0 / (StepLimits{}.prior_px * StepLimits{}.prior_px);
+  // the shift of a gridline's ends that remains, in deviations of its bending. Derived: as in BendingLimits.
+  double bend_to_end_shift = BendingLimits{}.bend_to_end_shift;
   InformationLimits information;
-
-  template <class F>
-  static AcceptanceLimits read(const F& f) {
-    return {f["max_shift"],       f["max_shift_all_cells"], f["max_deviation"],
-            f["min_information"], f["bend_to_end_shift"],   f["information"]};
-  }
 };
 
-// Limits of markers that dirt hides; explained in extractor/refine/acceptance.py.
+// Limits of markers that dirt hides, in units of the edges around the marker where nothing else is said.
 struct HiddenMarkerLimits {
-  double max_shift_unexplained, max_shift_from_prediction, dot_gain_factor, unexplained_deviation,
-      dirt_deviation;
-  double disagreement_scale, max_place_error;
-
-  template <class F>
-  static HiddenMarkerLimits read(const F& f) {
-    return {f["max_shift_unexplained"], f["max_shift_from_prediction"],
-            f["dot_gain_factor"],       f["unexplained_deviation"],
-            f["dirt_deviation"],        f["disagreement_scale"],
-            f["max_place_error"]};
-  }
+  // from the start place, where the drawing explains nothing well. Chosen.
+  double max_shift_unexplained = 0.13;
+  double max_shift_from_prediction = 0.05;  // from where the neighbours put an unaccepted marker. Chosen.
+  // times the dot gain, added to max_shift_unexplained: corners move most. Chosen.
+  double dot_gain_factor = 2.0;
+  // by dirt, of the visible part where the drawing does not explain the image. Chosen.
+  double unexplained_deviation = 0.015;
+  // by dirt, where it does, but no gridline of the marker has any weight. Chosen.
+  double dirt_deviation = 0.01;
+  // of profiles and triangles, where all triangles of a marker were found. Chosen.
+  double disagreement_scale = 0.03;
+  // between a marker's place by its gridlines and a correct initial place. Derived: as in marker_places.
+  double max_place_error = numbering::MAX_PLACE_ERROR;
 };
 
-// Limits of both; explained in extractor/refine/acceptance.py.
+// Limits of the markers after the last step.
 struct FinalLimits {
-  double unexplained_noise_ratio;
+  // noise of the drawing over that of the pixels, above which the drawing explains too little to move a
+  // marker far. Chosen.
+  double unexplained_noise_ratio = 3.0;
   AcceptanceLimits acceptance;
   HiddenMarkerLimits hidden;
-
-  template <class F>
-  static FinalLimits read(const F& f) {
-    return {f["unexplained_noise_ratio"], f["acceptance"], f["hidden"]};
-  }
 };
 
 // The markers as the last step left them.
@@ -59,22 +63,29 @@ struct SolvedMarkers {
   double dot_gain;                            // px
   View<const double, 3> convergence_cov_px2;  // (M, 2, 2) of the error that the last step left
 
-  template <class F>
-  static SolvedMarkers read(const F& f) {
-    return {f["measured"], f["reliable"],    f["information"], f["bend_variance"],      f["weight"],
-            f["noise"],    f["pixel_noise"], f["dot_gain"],    f["convergence_cov_px2"]};
-  }
+  CMP_RECORD("extractor.refine.estimate.Estimate", measured, reliable, information, bend_variance, weight,
+             noise, pixel_noise, dot_gain, convergence_cov_px2)
 };
 
-// xy_px, cov_px2, unaccepted and all_accepted of FinalMarkers.
-using FinalMarkers = std::tuple<Array<double, 2>, Array<double, 3>, Array<bool, 1>, bool>;
+// The M markers after the tests.
+struct FinalMarkers {
+  Array<double, 2> xy_px;     // (M, 2) NaN where not accepted
+  Array<double, 3> cov_px2;   // (M, 2, 2) likewise
+  Array<bool, 1> unaccepted;  // (M,)
+  bool all_accepted;
+
+  CMP_RECORD("extractor.refine.acceptance.FinalMarkers", xy_px, cov_px2, unaccepted, all_accepted)
+};
 
 // Tests all markers. Where the drawing explains nothing well, markers far from their start are not accepted.
 FinalMarkers accept_markers(const SolvedMarkers& solved, const StartPlaces& places,
                             const layout::Topology& topology, const FinalLimits& limits);
 
 // Markers (M, 2) px and covariances (M, 2, 2) px^2, NaN where not accepted.
-using AcceptedMarkers = std::tuple<Array<double, 2>, Array<double, 3>>;
+struct AcceptedMarkers {
+  Array<double, 2> xy_px;
+  Array<double, 3> cov_px2;
+};
 
 // The markers that lie near their start place with a small deviation.
 //

@@ -15,28 +15,28 @@
 
 namespace cmp::refine {
 
-// Limits of the drawing; explained in extractor/refine/drawn_pattern.py.
+// Limits of the drawing.
 struct DrawingLimits {
-  double margin_sigma, margin_px, blur_step;
+  // blurs around the pattern that are drawn. Derived: 6e-5 of a blurred edge lies beyond.
+  double margin_sigma = 4.0;
+  double margin_px = 2.0;   // px, added to that. Chosen.
+  double blur_step = 0.02;  // of the blur, for derivatives of the levels. Chosen.
   GridlineLimits gridlines;
   InkLevelLimits levels;
   BleedLimits bleed;
   PixelRowLimits rows;
   GridlineWeightLimits weights;
-
-  template <class F>
-  static DrawingLimits read(const F& f) {
-    return {f["margin_sigma"], f["margin_px"], f["blur_step"], f["gridlines"],
-            f["levels"],       f["bleed"],     f["rows"],      f["weights"]};
-  }
 };
 
-// The gridlines (E, 8); the light on both sides (E, 6), as GridlineSides gives it; contrasts (E, 3), as
-// value_contrasts gives them; the light to add on both sides (E, 6); the sums along the gridlines (E, 24), as
-// accumulate_residual_sums gives them; the levels, corrected by the residual in the middles of the cells; and
-// the median length of the gridlines, px.
-using DrawnPattern = std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 2>, Array<double, 2>,
-                                Array<double, 2>, LevelArrays, double>;
+struct DrawnPattern {
+  Array<double, 2> lines;      // (E, 8) the gridlines
+  Array<double, 2> sides;      // (E, 6) the light on both sides, as GridlineSides gives it
+  Array<double, 2> contrasts;  // (E, 3) as value_contrasts gives them
+  Array<double, 2> added;      // (E, 6) the light to add on both sides
+  Array<double, 2> sums;       // (E, 24) as accumulate_residual_sums gives them
+  LevelArrays corrected;       // the levels, by the residual in the middles of the cells
+  double edge_px;              // the median length of the gridlines
+};
 
 // Draws the pattern with the levels of its inks into the box (4,) of the picture (H, W, 3), and compares the
 // two.

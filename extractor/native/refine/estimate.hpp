@@ -19,23 +19,8 @@ struct PatternState {
   double dot_gain;                  // px
   MarkerScatter scatter;
 
-  template <class F>
-  static PatternState read(const F& f) {
-    return {f["xy"],     f["hidden"], f["maps"],  f["roughness"], f["bend"],
-            f["weight"], f["sigma"],  f["noise"], f["dot_gain"],  f["scatter"]};
-  }
-};
-
-// The change of color across the gridlines.
-struct EdgeContrasts {
-  View<const double, 2> sides;      // (E, 6) light on both sides, as GridlineSides gives it
-  View<const double, 2> contrasts;  // (E, 3) gray levels, differences of the values on both sides
-  View<const double, 2> clearance;  // (E, 4), as gridline_clearance gives it
-
-  template <class F>
-  static EdgeContrasts read(const F& f) {
-    return {f["sides"], f["contrasts"], f["clearance"]};
-  }
+  CMP_RECORD("extractor.refine.estimate.Estimate", xy, hidden, maps, roughness, bend, weight, sigma, noise,
+             dot_gain, scatter)
 };
 
 // Markers before refinement.
@@ -46,10 +31,7 @@ struct StartPlaces {
   View<const bool, 1> agreed;     // (M,) the triangles found at the marker meet
   View<const bool, 1> is_intact;  // (M,) these are all triangles that the pattern has there
 
-  template <class F>
-  static StartPlaces read(const F& f) {
-    return {f["xy_px"], f["edge_px"], f["agreed"], f["is_intact"]};
-  }
+  CMP_RECORD("extractor.numbering.marker_places.InitialMarkers", xy_px, edge_px, agreed, is_intact)
 };
 
 }  // namespace cmp::refine

@@ -15,27 +15,24 @@
 
 namespace cmp::refine {
 
-// Limits of the first look; explained in extractor/refine/first_look.py.
+// Limits of the first look.
 struct FirstLookLimits {
-  double fallback_sigma_px;
-  Index blur_gridlines;
+  double fallback_sigma_px = 0.9;  // the blur where no gridline shows it. Chosen.
+  Index blur_gridlines = 60;       // gridlines for the first estimate of the blur. Chosen.
   image::NoiseLimits noise;
   InkLevelLimits levels;
   EdgeProfileLimits profiles;
   BleedLimits bleed;
   GridlineWeightLimits weights;
-
-  template <class F>
-  static FirstLookLimits read(const F& f) {
-    return {f["fallback_sigma_px"], f["blur_gridlines"], f["noise"],  f["levels"],
-            f["profiles"],          f["bleed"],          f["weights"]};
-  }
 };
 
 // The noise, gray levels, and the fields of InkLevels.
 using FirstAppearance = std::tuple<double, LevelArrays>;
-// sides (E, 6), contrasts (E, 3) and clearance (E, 4) of EdgeContrasts.
-using ContrastArrays = std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 2>>;
+struct ContrastArrays {
+  Array<double, 2> sides, contrasts, clearance;  // as in EdgeContrasts
+
+  CMP_RECORD("extractor.refine.estimate.EdgeContrasts", sides, contrasts, clearance)
+};
 // The blur, px; and the bleed of each cell (K,) and its median, as bleed_shares gives them.
 using BlurAndBleed = std::tuple<double, Array<double, 1>, double>;
 

@@ -10,16 +10,15 @@ namespace cmp::refine {
 
 void add_markers(nb::module_ module) {
   bind<&correct_outliers>(module, "correct_outliers",
-                          {"topology", "markers", "places", "profile_weight", "scale", "limits"});
-  bind<&accept_markers>(module, "accept_markers", {"solved", "places", "topology", "limits"});
+                          {"topology", "markers", "places", "profile_weight", "scale"});
+  bind<&accept_markers>(module, "accept_markers", {"solved", "places", "topology"});
   bind<&update_lost_markers>(module, "update_lost_markers",
-                             {"xy", "cov", "unaccepted", "predicted", "start", "edge", "limits"});
+                             {"xy", "cov", "unaccepted", "predicted", "start", "edge"});
   bind<&fill_recovered_markers>(module, "fill_recovered_markers",
-                                {"view", "state", "contrasts", "places", "topology", "markers", "limits"});
-  bind<&initial_appearance>(module, "initial_appearance", {"view", "topology", "xy", "sigma", "limits"});
-  bind<&edge_contrasts>(module, "edge_contrasts", {"lines", "xy", "topology", "levels", "view", "limits"});
-  bind<&blur_and_bleed>(module, "blur_and_bleed",
-                        {"view", "lines", "across", "xy", "cells", "assumed", "limits"});
+                                {"view", "state", "contrasts", "places", "topology", "markers"});
+  bind<&initial_appearance>(module, "initial_appearance", {"view", "topology", "xy", "sigma"});
+  bind<&edge_contrasts>(module, "edge_contrasts", {"lines", "xy", "topology", "levels", "view"});
+  bind<&blur_and_bleed>(module, "blur_and_bleed", {"view", "lines", "across", "xy", "cells", "assumed"});
 }
 
 }  // namespace cmp::refine

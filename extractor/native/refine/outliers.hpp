@@ -5,36 +5,33 @@
 
 #include "base/array.hpp"
 #include "layout/topology.hpp"
+#include "numbering/marker_places.hpp"
 #include "refine/estimate.hpp"
 #include "refine/synthesis/gridlines.hpp"
 
 namespace cmp::refine {
 
-// Limits of outliers; explained in extractor/refine/outliers.py.
+// Limits of outliers. The native code has room for two ratios and two shifts.
 struct OutlierLimits {
-  double min_mean_weight;
-  std::array<double, 2> outlier_ratios, min_outlier_shifts;  // of a suspect marker and of any other
-  double min_agreeing_share;
-  Index min_agreeing_gridlines;
-  double agreement_tolerance;
-  Index extrapolated_rings, max_rounds;
-  double max_place_error, rounding_allowance;
+  // of the gridlines measured at a marker, below which the marker is suspect. Chosen.
+  double min_mean_weight = 0.55;
+  // shift of an outlier over that of the markers around, of a suspect marker and of any other. Chosen.
+  std::array<double, 2> outlier_ratios = {3.0, 6.0};
+  std::array<double, 2> min_outlier_shifts = {0.02, 0.03};  // the least such shifts, in edges. Chosen.
+  // the gridlines of a marker agree on a shift if more than this share of them do. Chosen.
+  double min_agreeing_share = 0.7;
+  Index min_agreeing_gridlines = 3;  // the same, as a number of gridlines. Chosen.
+  // share of a shift, by which the shifts of gridlines that agree may differ. Chosen.
+  double agreement_tolerance = 0.5;
+  Index extrapolated_rings = 2;  // of outliers that the markers around are continued to. Chosen.
+  Index max_rounds = 6;          // an outlier hides the errors of its neighbours. Chosen.
+  // in edges, between a marker's place by its neighbours and a correct initial place. Derived: as in
+  // marker_places.
+  double max_place_error = numbering::MAX_PLACE_ERROR;
+  // of the squared least shift; a marker whose largest differences stay below cannot move. Derived: below 1
+  // by more than rounding.
+  double rounding_allowance = 0.99;
   GridlineLimits gridlines;
-
-  template <class F>
-  static OutlierLimits read(const F& f) {
-    return {f["min_mean_weight"],
-            f["outlier_ratios"],
-            f["min_outlier_shifts"],
-            f["min_agreeing_share"],
-            f["min_agreeing_gridlines"],
-            f["agreement_tolerance"],
-            f["extrapolated_rings"],
-            f["max_rounds"],
-            f["max_place_error"],
-            f["rounding_allowance"],
-            f["gridlines"]};
-  }
 };
 
 // The markers as the last step left them, px of the image reduced by `scale`.
@@ -44,16 +41,18 @@ struct MeasuredMarkers {
   View<const double, 3> maps;                // (M, 2, 5) as local_maps gives them
   View<const double, 1> weight;              // (E,) of the gridlines in the step
 
-  template <class F>
-  static MeasuredMarkers read(const F& f) {
-    return {f["measured"], f["reliable"], f["hidden"], f["maps"], f["weight"]};
-  }
+  CMP_RECORD("extractor.refine.estimate.Estimate", measured, reliable, hidden, maps, weight)
 };
 
-// found; measured and reliable (M, 2); xy_px (M, 2), agreed (M,) and is_intact (M,) of the places. The arrays
-// are empty if nothing was found.
-using CorrectedOutliers =
-    std::tuple<bool, Array<double, 2>, Array<double, 2>, Array<double, 2>, Array<bool, 1>, Array<bool, 1>>;
+// Markers with outliers at their places; the arrays are empty if nothing was found.
+struct CorrectedOutliers {
+  bool found;
+  Array<double, 2> measured, reliable, xy_px;  // (M, 2)
+  Array<bool, 1> agreed, is_intact;            // (M,)
+
+  CMP_RECORD("extractor.refine.outliers.CorrectedOutliers", found, measured, reliable, xy_px, agreed,
+             is_intact)
+};
 
 // (M,), the markers whose gridlines with a positive weight (E,) have little profile_weight (E,); spokes (M,
 // 6).

@@ -65,7 +65,7 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
                               state.scatter.share};
   StepSolution solved = solve_step(system, gradients, state.bend,
                                    {topology, state.xy, state.hidden, bent.response}, limits.step);
-  return {std::move(profile_weight), std::move(weight), dot_gain, as_tuple(std::move(solved))};
+  return {std::move(profile_weight), std::move(weight), dot_gain, std::move(solved)};
 }
 
 }  // namespace cmp::refine

@@ -7,30 +7,32 @@
 #include "image/pyramid.hpp"
 #include "layout/topology.hpp"
 #include "refine/estimate.hpp"
+#include "refine/measure/dot_gain.hpp"
 #include "refine/measure/matched_filter.hpp"
 #include "refine/outliers.hpp"
 #include "refine/refinement_step.hpp"
-#include "refine/synthesis/dot_gain.hpp"
 
 namespace cmp::refine {
 
-// Limits of a round of profiles; explained in extractor/refine/profile_rounds.py.
+// Limits of a round of profiles.
 struct ProfileLimits {
-  double misfit_tolerance;
-  MisfitRule rule;
+  // of the contrast; what glare and uneven light make in a profile does not lower its weight. Chosen.
+  double misfit_tolerance = 0.1;
+  MisfitRule rule = {1, 4, 1.0};  // of the gridlines' weights; each sample has one value. Chosen.
   StepLimits step;
   MatchedFilterLimits rows;
   DotGainLimits dot_gain;
   OutlierLimits outliers;
-
-  template <class F>
-  static ProfileLimits read(const F& f) {
-    return {f["misfit_tolerance"], f["rule"], f["step"], f["rows"], f["dot_gain"], f["outliers"]};
-  }
 };
 
-// profile_weight, weight, dot_gain and solution of ProfileStep.
-using ProfileStep = std::tuple<Array<double, 1>, Array<double, 1>, double, SolutionArrays>;
+struct ProfileStep {
+  Array<double, 1> profile_weight;  // (E,) 0 to 1, similarity of each gridline to the pattern
+  Array<double, 1> weight;          // (E,) 0 to 1, with which it was used
+  double dot_gain;                  // px
+  StepSolution solution;
+
+  CMP_RECORD("extractor.refine.profile_rounds.ProfileStep", profile_weight, weight, dot_gain, solution)
+};
 
 // The measurements of a round of profiles, and the solution.
 //

@@ -2,12 +2,12 @@
 
 #include <cmath>
 
+#include "refine/measure/dot_gain.hpp"
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/measure/gridline_weights.hpp"
 #include "refine/measure/matched_filter.hpp"
 #include "refine/refinement_step.hpp"
 #include "refine/solve/subproblem.hpp"
-#include "refine/synthesis/dot_gain.hpp"
 
 namespace cmp::refine {
 

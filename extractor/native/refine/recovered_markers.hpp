@@ -14,20 +14,16 @@
 
 namespace cmp::refine {
 
-// Limits of the round; explained in extractor/refine/recovered_markers.py.
+// Limits of the round.
 struct RecoveryLimits {
-  Index stations, reference_interval, min_reference_gridlines;
+  Index stations = 16;            // of a gridline. Chosen.
+  Index reference_interval = 12;  // one of so many other gridlines is read. Chosen.
+  // other gridlines for the usual misfit; with fewer, all together give it. Chosen.
+  Index min_reference_gridlines = 20;
   ProfileLimits profiles;
   GridlineLimits gridlines;
   AcceptanceLimits acceptance;
   HiddenMarkerLimits hidden;
-
-  template <class F>
-  static RecoveryLimits read(const F& f) {
-    return {f["stations"], f["reference_interval"], f["min_reference_gridlines"],
-            f["profiles"], f["gridlines"],          f["acceptance"],
-            f["hidden"]};
-  }
 };
 
 // The markers to fill in.
@@ -36,10 +32,7 @@ struct LostMarkers {
   View<double, 2> xy;   // (M, 2) px, written; NaN where a lost marker is not accepted, or far from its place
   View<double, 3> cov;  // (M, 2, 2) px^2, likewise
 
-  template <class F>
-  static LostMarkers read(const F& f) {
-    return {f["lost"], f["xy"], f["cov"]};
-  }
+  CMP_RECORD("extractor.refine.recovered_markers.LostMarkers", lost, xy, cov)
 };
 
 // Fills in the lost markers whose gridlines look like the pattern.

@@ -80,7 +80,7 @@ MovedPattern move_pattern(const SteppedMarkers& markers, const layout::Topology&
   Array<double, 1> roughness = measure_roughness(
       known, maps, diagonal, {topology.edges, topology.next_markers, topology.third_differences},
       topology.spokes, topology.ring_markers, limits.bending);
-  const ScatterFigures scatter = measure_scatter(known, maps, diagonal, topology, limits.scatter);
+  const MarkerScatter scatter = measure_scatter(known, maps, diagonal, topology, limits.scatter);
   return {std::move(xy), std::move(hidden), std::move(maps), std::move(roughness), scatter};
 }
 
@@ -142,12 +142,6 @@ WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients
       curving(curved.topology.covariance_couplings, system.scatter_share, curved.bend_response);
   update_curving(out.solution.information, weighed, of_covariance);
   return out;
-}
-
-SolutionArrays as_tuple(StepSolution&& solution) {
-  InformationArrays& information = solution.information;
-  return {std::move(solution.measured), std::move(solution.reliable), std::move(solution.bend),
-          std::tuple(std::move(information.diagonal), std::move(information.off_diagonal))};
 }
 
 Array<double, 1> prior_information(View<const bool, 1> hidden, const StepLimits& limits) {

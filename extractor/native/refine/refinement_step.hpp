@@ -21,27 +21,18 @@ struct MisfitRule {
   Index values, min_places;  // that each pixel or sample adds; pixels or samples, above which it is weighed
   double default_weight;     // of a gridline with fewer
 
-  template <class F>
-  static MisfitRule read(const F& f) {
-    return {f["values"], f["min_places"], f["default_weight"]};
-  }
+  CMP_FIELDS(values, min_places, default_weight)
 };
 
-// Limits of a step; explained in extractor/refine/refinement_step.py.
+// Limits of a step.
 struct StepLimits {
-  double prior_px;
+  double prior_px = 10.0;  // deviation of a marker before it is measured. Chosen.
   GridlineWeightLimits weights;
   BendingLimits bending;
   InformationLimits information;
   DisagreementLimits disagreement;
   GridlineLimits gridlines;
   ScatterLimits scatter;
-
-  template <class F>
-  static StepLimits read(const F& f) {
-    return {f["prior_px"],     f["weights"],   f["bending"], f["information"],
-            f["disagreement"], f["gridlines"], f["scatter"]};
-  }
 };
 
 // The bending of the gridlines as it was eliminated.
@@ -54,6 +45,8 @@ struct EliminatedBending {
 struct StepSolution {
   Array<double, 2> measured, reliable, bend;
   InformationArrays information;
+
+  CMP_RECORD("extractor.refine.refinement_step.StepSolution", measured, reliable, bend, information)
 };
 
 // The same with (E,) the ratio of the variance along each gridline to that of noise.
@@ -62,12 +55,13 @@ struct WeighedSolution {
   StepSolution solution;
 };
 
-// measured, reliable and bend of StepSolution, and the blocks of its information.
-using SolutionArrays = std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 2>,
-                                  std::tuple<Array<double, 2>, Array<double, 2>>>;
+struct ExtrapolatedPattern {
+  Array<double, 2> xy;    // (M, 2) px
+  Array<bool, 1> hidden;  // (M,)
+  Array<double, 3> maps;  // (M, 2, 5)
 
-// xy (M, 2), hidden (M,) and maps (M, 2, 5) of ExtrapolatedPattern.
-using ExtrapolatedPattern = std::tuple<Array<double, 2>, Array<bool, 1>, Array<double, 3>>;
+  CMP_RECORD("extractor.refine.refinement_step.ExtrapolatedPattern", xy, hidden, maps)
+};
 
 // The markers (M, 2) px, NaN where unknown, with those just beyond the known ones.
 ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::Topology& topology,
@@ -78,15 +72,19 @@ struct SteppedMarkers {
   View<const double, 2> reliable;  // (M, 2) px, NaN where unknown
   Information information;
 
-  template <class F>
-  static SteppedMarkers read(const F& f) {
-    return {f["reliable"], f["information"]};
-  }
+  CMP_RECORD("extractor.refine.estimate.Estimate", reliable, information)
 };
 
-// xy (M, 2), hidden (M,), maps (M, 2, 5), roughness (M,) and the figures of scatter of MovedPattern.
-using MovedPattern =
-    std::tuple<Array<double, 2>, Array<bool, 1>, Array<double, 3>, Array<double, 1>, ScatterFigures>;
+// The same with what bends its gridlines.
+struct MovedPattern {
+  Array<double, 2> xy;
+  Array<bool, 1> hidden;
+  Array<double, 3> maps;
+  Array<double, 1> roughness;  // (M,) px^2
+  MarkerScatter scatter;
+
+  CMP_RECORD("extractor.refine.refinement_step.MovedPattern", xy, hidden, maps, roughness, scatter)
+};
 
 // The pattern at the markers that a step left, and how its gridlines may bend.
 MovedPattern move_pattern(const SteppedMarkers& markers, const layout::Topology& topology,
@@ -112,8 +110,6 @@ StepSolution solve_step(const GridlineSystem& system, const ShiftGradients& grad
 WeighedSolution solve_weighed(const GridlineSystem& system, const ShiftGradients& gradients,
                               View<const double, 2> bend, const CurvedGridlines& curved,
                               const StepLimits& limits);
-
-SolutionArrays as_tuple(StepSolution&& solution);
 
 // (M,) 1/px^2, the information about each marker before it is measured; hidden (M,).
 Array<double, 1> prior_information(View<const bool, 1> hidden, const StepLimits& limits);

@@ -4,18 +4,15 @@
 #include <tuple>
 
 #include "base/array.hpp"
+#include "numbering/marker_places.hpp"
 #include "refine/estimate.hpp"
 
 namespace cmp::refine {
 
-// Limits of the markers at the full scale; explained in extractor/refine/refiner.py.
+// Limits of the markers at the full scale.
 struct FullScaleLimits {
-  double agreed_deviation;
-
-  template <class F>
-  static FullScaleLimits read(const F& f) {
-    return {f["agreed_deviation"]};
-  }
+  // in edges, of the place of a lost marker on which all triangles agree. Chosen.
+  double agreed_deviation = numbering::AGREED_DEVIATION;
 };
 
 // Markers (M, 2) px and covariances (M, 2, 2) px^2 in the full image; a lost one lies where its triangles

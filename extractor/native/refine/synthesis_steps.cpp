@@ -48,7 +48,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
                         sigma,
                         noise};
   return {std::move(reading),
-          as_tuple(std::move(solved.solution)),
+          std::move(solved.solution),
           std::move(bent.variance),
           dot_gain,
           blur_px,

@@ -7,31 +7,40 @@
 #include "layout/topology.hpp"
 #include "refine/drawn_pattern.hpp"
 #include "refine/estimate.hpp"
+#include "refine/measure/dot_gain.hpp"
 #include "refine/refinement_step.hpp"
-#include "refine/synthesis/dot_gain.hpp"
 
 namespace cmp::refine {
 
-// Limits of a step by synthesis; explained in extractor/refine/synthesis_steps.py.
+// Limits of a step by synthesis.
 struct SynthesisLimits {
-  MisfitRule rule;
+  MisfitRule rule = {3, 8, 0.0};  // of the gridlines' weights; a pixel has three values. Chosen.
   StepLimits step;
   DotGainLimits dot_gain;
   DrawingLimits drawing;
-
-  template <class F>
-  static SynthesisLimits read(const F& f) {
-    return {f["rule"], f["step"], f["dot_gain"], f["drawing"]};
-  }
 };
 
-// The fields of GridlineReading.
-using ReadGridlines = std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 2>, Array<double, 1>,
-                                 Array<double, 1>, Array<double, 1>, double, double>;
+struct ReadGridlines {
+  Array<double, 2> lines, sides, added;                      // (E, 8), (E, 6), (E, 6)
+  Array<double, 1> weight, variance_ratio, dot_gain_offset;  // (E,)
+  double sigma, noise;                                       // px; gray levels
 
-// The fields of SynthesisStep.
-using SynthesisStep = std::tuple<ReadGridlines, SolutionArrays, Array<double, 1>, double, double, LevelArrays,
-                                 Array<bool, 1>, double>;
+  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, added, weight,
+             variance_ratio, dot_gain_offset, sigma, noise)
+};
+
+struct SynthesisStep {
+  ReadGridlines reading;
+  StepSolution solution;
+  Array<double, 1> bend_variance;  // (E,) px^2
+  double dot_gain, sigma;          // px
+  LevelArrays levels;
+  Array<bool, 1> is_read;  // (E,)
+  double edge_px;
+
+  CMP_RECORD("extractor.refine.synthesis_steps.SynthesisStep", reading, solution, bend_variance, dot_gain,
+             sigma, levels, is_read, edge_px)
+};
 
 // Draws the pattern into the picture (H, W, 3), compares it with the image, and solves for the markers.
 SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topology& topology,

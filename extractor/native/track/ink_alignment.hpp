@@ -8,27 +8,30 @@
 
 namespace cmp::track {
 
-// The limits of the alignment; the Python module explains them.
+// Limits of the alignment.
 struct AlignmentLimits {
-  double search_radius;
-  std::int64_t min_rows;
-  double min_pixel_ink;
-  double min_ink_share;
-  double max_shift;
-  double max_spread;
-  double min_volume;
-  double min_area_px;
-
-  template <class F>
-  static AlignmentLimits read(const F& f) {
-    return {f["search_radius"], f["min_rows"],   f["min_pixel_ink"], f["min_ink_share"],
-            f["max_shift"],     f["max_spread"], f["min_volume"],    f["min_area_px"]};
-  }
+  double search_radius = 0.9;  // of the window around a cell's middle, in edges. Chosen.
+  std::int64_t min_rows = 8;   // of pixels that are sampled in the window, at least. Chosen.
+  double min_pixel_ink = 0.2;  // of an ink, for a pixel to count as this ink. Chosen.
+  double min_ink_share = 0.4;  // of a cell's area that must show its ink in the window. Chosen.
+  // of a cell from its prediction, in edges; beyond it the cell's shift is unknown. Chosen.
+  double max_shift = 0.35;
+  // of the shifts of cells that share a marker, from their mean, in edges; beyond it the marker is unknown.
+  // Chosen.
+  double max_spread = 0.25;
+  // sine of the angle of an ink to the plane of the two others, for unmixing. Chosen.
+  double min_volume = 0.05;
+  // px^2, of the parallelogram of the window's unit axes; smaller cells have no shift. Chosen.
+  double min_area_px = 1.0;
 };
 
-// The markers (M, 2), NaN where the shifts of the cells disagree or are unknown; the largest shift, in edges;
-// the mean edges (M,) of the cells at each marker, px.
-using AlignedMarkers = std::tuple<Array<double, 2>, double, Array<double, 1>>;
+struct AlignedMarkers {
+  Array<double, 2> xy_px;    // (M, 2), NaN where the shifts of the cells disagree or are unknown
+  double max_shift;          // the largest shift, in edges
+  Array<double, 1> edge_px;  // (M,) px, the mean edges of the cells at each marker
+
+  CMP_RECORD("extractor.track.ink_alignment.AlignedMarkers", xy_px, max_shift, edge_px)
+};
 
 // (C, 2) px from each cell's predicted middle to the centroid of its ink nearby, NaN where there is too
 // little ink.

@@ -35,11 +35,9 @@ bool has_own_ink(const std::array<double, 3>& color, Index i, const WarmTables& 
 
 }  // namespace
 
-std::tuple<std::int64_t, std::int64_t> count_matching_centers(View<const std::uint8_t, 3> image,
-                                                              View<const double, 2> xy,
-                                                              const WarmTables& tables,
-                                                              View<const double, 2> levels,
-                                                              const WarmStartLimits& limits) {
+VisibleCells count_matching_centers(View<const std::uint8_t, 3> image, View<const double, 2> xy,
+                                    const WarmTables& tables, View<const double, 2> levels,
+                                    const WarmStartLimits& limits) {
   const auto flat = image.flat();
   const Index height = image.size(0), width = image.size(1);
   std::array<double, 3> color{};

@@ -8,30 +8,32 @@
 
 namespace cmp::track {
 
-// The limits of the native part; the Python module explains them.
+// Limits of the proof.
 struct WarmStartLimits {
-  double center_radius_px;
-  double min_center_strength;
-  double min_verified_share;
-
-  template <class F>
-  static WarmStartLimits read(const F& f) {
-    return {f["center_radius_px"], f["min_center_strength"], f["min_verified_share"]};
-  }
+  double center_radius_px = 0.5;  // of the disc over which a middle's color is averaged. Chosen.
+  // of a middle's ink level, relative to the frame before, for the middle to show its ink. Chosen.
+  double min_center_strength = 0.3;
+  double min_verified_share = 0.95;  // of the cells in view that the image must confirm. Chosen.
 };
 
-// The markers (M, 2), NaN where no proved cell has a corner; agreed (M,) and is_intact (M,) of
-// InitialMarkers.
-using VerifiedMarkers = std::tuple<Array<double, 2>, Array<bool, 1>, Array<bool, 1>>;
+struct VerifiedMarkers {
+  Array<double, 2> xy_px;            // (M, 2), NaN where no proved cell has a corner
+  Array<bool, 1> agreed, is_intact;  // (M,) as in InitialMarkers
 
-// Number of cells in view, and of those whose middle matches their own ink better than the two others.
-//
+  CMP_RECORD("extractor.track.warm_start.VerifiedMarkers", xy_px, agreed, is_intact)
+};
+
+// The cells of a layout whose middles lie in the image.
+struct VisibleCells {
+  std::int64_t visible, matching;  // the latter match their own ink better than the two others
+
+  CMP_RECORD("extractor.track.warm_start.VisibleCells", visible, matching)
+};
+
 // image (H, W, 3) BGR; xy (M, 2) markers, NaN where not predicted; levels (C, 3) ink levels over black.
-std::tuple<std::int64_t, std::int64_t> count_matching_centers(View<const std::uint8_t, 3> image,
-                                                              View<const double, 2> xy,
-                                                              const WarmTables& tables,
-                                                              View<const double, 2> levels,
-                                                              const WarmStartLimits& limits);
+VisibleCells count_matching_centers(View<const std::uint8_t, 3> image, View<const double, 2> xy,
+                                    const WarmTables& tables, View<const double, 2> levels,
+                                    const WarmStartLimits& limits);
 
 // (C,) the confirmed cells that are connected to the first ones (C,) over common markers; and whether they
 // are nearly all of the cells in view whose markers were known (M,).

@@ -15,10 +15,7 @@ struct WarmTables {
   View<const std::uint8_t, 2> across_edge;  // (C, 3) the kind of cell across the edge from corner k to k + 1
   View<const std::int32_t, 2> nearest;      // (C, 3) the nearest red, green and blue cell
 
-  template <class F>
-  static WarmTables read(const F& f) {
-    return {f["corners"], f["ink"], f["across_edge"], f["nearest"]};
-  }
+  CMP_RECORD("extractor.track.warm_tables.WarmTables", corners, ink, across_edge, nearest)
 };
 
 // The markers xy (M, 2), px; those that are NaN are predicted from known cells across one of their edges.

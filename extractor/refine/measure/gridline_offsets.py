@@ -14,27 +14,6 @@ from numpy.typing import NDArray
 
 from extractor._native import measure as native
 from extractor.image.pyramid import PyramidLevel
-from extractor.refine.synthesis.pixel_rows import LIMITS as PIXEL_LIMITS
-
-
-class OffsetLimits(NamedTuple):
-    """Limits of the offsets.
-
-    Attributes:
-        min_weight_sum: of the squared weights of pixels at a virtual marker, in units of the squared contrast. Chosen.
-        min_offset_weight: of a gridline, for its offsets to be measured. Chosen.
-        band: in units of the blur, the distance from a gridline within which pixels count. Derived: as in
-            ``PixelRowLimits``.
-        min_profile_gridlines: of an ink; with no more, its profile is taken as 0. Chosen, as for the dot gain.
-    """
-
-    min_weight_sum: float = 0.08
-    min_offset_weight: float = 0.4
-    band: float = PIXEL_LIMITS.band
-    min_profile_gridlines: int = 40
-
-
-LIMITS = OffsetLimits()
 
 
 class GridlineReading(NamedTuple):
@@ -77,5 +56,5 @@ def measure_virtual_markers(
     """
     if count == 0:
         return np.empty((len(reading.lines), 0, 3))
-    offsets = native.measure_offsets(view, model, reading, count, LIMITS)
-    return np.asarray(native.virtual_markers(reading.lines, offsets, view.scale))
+    offsets = native.measure_offsets(view, model, reading, count)
+    return native.virtual_markers(reading.lines, offsets, view.scale)

@@ -44,30 +44,6 @@ class MarkerScatter(NamedTuple):
 NO_SCATTER = MarkerScatter(0.0, 0.0)
 
 
-class ScatterLimits(NamedTuple):
-    """Limits of the scatter.
-
-    Attributes:
-        smooth_ratio: variance of fourth differences over that of third differences, at most, without scatter. On bulges
-            and twists of the suite "plain" it is 0.14 to 0.41 (`python -m benchmarks.calibration --suite plain`). With
-            0.3, dents and balls on patterns of 4 and 6 layers (`tests/extractor/refine/test_bending.py`) were taken for
-            scatter; with 1.5 hardly any are, and their errors do not rise. Measured by both.
-        noise_allowance: stated variances of a marker that are noise, not scatter. On the flat patterns of that suite
-            fourth differences ask for 1.0 to 1.5, in steep views for 7 after the first step; a scatter of 0.05 px makes
-            40 to 60. Measured: rule "scatter".
-        quantile: of the squared differences, by which their variance is measured: scatter is everywhere, and rims,
-            slips and dirt are somewhere. By the median, a slip of a tenth of an edge on a pattern of 4 layers was taken
-            for scatter, and its errors rose by a half. Measured: rule "scatter".
-    """
-
-    smooth_ratio: float = 1.5
-    noise_allowance: float = 8.0
-    quantile: float = 0.25
-
-
-LIMITS = ScatterLimits()
-
-
 def measure_scatter(
     xy: NDArray[np.float64],
     maps: NDArray[np.float64],
@@ -82,5 +58,4 @@ def measure_scatter(
         diagonal: (M, 3) 1/px^2, the information's diagonal blocks.
         topology: of the layout.
     """
-    found = native.measure_scatter(xy, maps, diagonal, topology, LIMITS)
-    return MarkerScatter(*found)
+    return native.measure_scatter(xy, maps, diagonal, topology)

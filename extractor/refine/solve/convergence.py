@@ -14,28 +14,6 @@ from extractor.refine.solve.fisher_information import Information
 BLUR_REMAINDER = 20.0
 
 
-class ConvergenceLimits(NamedTuple):
-    """Limits of the remaining error after the last step.
-
-    Attributes:
-        remaining_share: of a step, per blur, that another step would still correct. Chosen.
-        max_remaining_share: of a step, at most. Chosen.
-        max_shrinking: of a marker's last step over the step before, at most; the following steps would shrink by the
-            same factor. Chosen: the following steps together are at most as long as the last one, because a factor from
-            two steps is uncertain.
-        mean_over_median: of squares, by which the median of the squared shifts becomes their mean. Derived: 1 / ln 2,
-            of the sum of two normal squares.
-    """
-
-    remaining_share: float = 1.0
-    max_remaining_share: float = 0.5
-    max_shrinking: float = 0.5
-    mean_over_median: float = 1.44
-
-
-LIMITS = ConvergenceLimits()
-
-
 def remaining_share(sigma: float, edge_px: float) -> float:
     """The share of a usual step that is left after the step, by blur and edge, px."""
     return BLUR_REMAINDER * (sigma / edge_px) ** 2
@@ -75,8 +53,7 @@ def step_remainder(
         remaining_share: share of a usual step that always remains.
         information: about the markers.
     """
-    step = measured, drawn, last, sigma, remaining_share
-    return StepRemainder(*native.step_remainder(*step, information.diagonal, LIMITS))
+    return native.step_remainder(measured, drawn, last, sigma, remaining_share, information.diagonal)
 
 
 def typical_bending(bend: NDArray[np.float64], is_read: NDArray[np.bool_], information: Information) -> float:
@@ -90,4 +67,4 @@ def typical_bending(bend: NDArray[np.float64], is_read: NDArray[np.bool_], infor
     Returns:
         Infinity where no gridline is read.
     """
-    return float(native.typical_bending(bend, is_read, information.diagonal))
+    return native.typical_bending(bend, is_read, information.diagonal)

@@ -1,7 +1,7 @@
 """The Fisher information matrix of the markers, its sparse solution and the diagonal blocks of its inverse.
 
 A marker's block adds up all gridlines that end there. Along a gridline the derivatives are weighted by 1 - t and t; the
-sums over its pixels are measured. Near a marker the gridlines share their pixels (``shared_pixels``).
+sums over its pixels are measured. Near a marker the gridlines share their pixels (`shared_pixels.hpp`).
 """
 
 from __future__ import annotations
@@ -12,29 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import solve as native
-from extractor.refine.solve import shared_pixels
-
-
-class InformationLimits(NamedTuple):
-    """Limits of the information, of its solution and of its inverse.
-
-    Attributes:
-        held_information: 1/px^2, of a marker that is held in place. Derived: more than any image holds.
-        max_steps: of the conjugate gradients. Chosen.
-        precision: of the solution, relative. Chosen.
-        min_determinant: of a marker's block, relative to its squared trace; with less a direction is unknown, and the
-            marker has no covariance. Chosen.
-        shared: of the pixels that gridlines share.
-    """
-
-    held_information: float = 1e12
-    max_steps: int = 80
-    precision: float = 3e-3
-    min_determinant: float = 1e-6
-    shared: shared_pixels.SharedPixelLimits = shared_pixels.LIMITS
-
-
-LIMITS = InformationLimits()
 
 
 class Information(NamedTuple):
@@ -72,8 +49,7 @@ def solve_shifts(
         (np.ascontiguousarray(diagonal), np.ascontiguousarray(off_diagonal)),
         np.ascontiguousarray(right),
     )
-    shift: NDArray[np.float64] = native.solve_shifts(*blocks, edges, right, right, LIMITS)
-    return shift
+    return native.solve_shifts(*blocks, edges, right, right)
 
 
 def covariances(
@@ -99,5 +75,4 @@ def covariances(
         (M, 2, 2) px^2, NaN where nothing is known and where not selected.
     """
     blocks = np.ascontiguousarray(diagonal), np.ascontiguousarray(off_diagonal)
-    cov: NDArray[np.float64] = native.covariances(*blocks, edges, spokes, min_information, selected, LIMITS)
-    return cov
+    return native.covariances(*blocks, edges, spokes, min_information, selected)

@@ -10,31 +10,10 @@ curves by the map's second derivatives (``marker_scatter``).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import synthesis as native
-from extractor.localmap.regularised_maps import LIMITS as MAP_LIMITS
-from extractor.localmap.regularised_maps import RegularisedMapLimits
-
-
-class GridlineLimits(NamedTuple):
-    """Limits of gridlines.
-
-    Attributes:
-        max_slope: of a gridline against its chord; a larger slope is an error of the map. Chosen.
-        min_length_px: px, of the chord; no shorter gridline is known. Chosen.
-        maps: limits of the maps where a ring is incomplete.
-    """
-
-    max_slope: float = 0.5
-    min_length_px: float = 1.0
-    maps: RegularisedMapLimits = MAP_LIMITS
-
-
-LIMITS = GridlineLimits()
 
 
 def local_maps(
@@ -56,7 +35,7 @@ def local_maps(
     Returns:
         (M, 2, 5): derivatives of x and y by the layout's x, y, xx, xy, yy; NaN where unknown.
     """
-    return np.asarray(native.local_maps(xy, near, offset, stencil, LIMITS))
+    return native.local_maps(xy, near, offset, stencil)
 
 
 def gridlines(
@@ -80,4 +59,4 @@ def gridlines(
         (E, 8): start and unit vector of the chord, its length, px; slopes against the chord at both ends, towards
         (-uy, ux); 1 where known. All 0 where unknown.
     """
-    return np.asarray(native.gridlines(xy, maps, bend, edges, along, scatter_share, LIMITS))
+    return native.gridlines(xy, maps, bend, edges, along, scatter_share)

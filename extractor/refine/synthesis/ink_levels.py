@@ -14,42 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import synthesis as native
-from extractor.refine.synthesis.ink_polynomials import LIMITS as POLYNOMIAL_LIMITS
-from extractor.refine.synthesis.ink_polynomials import PolynomialLimits
-
-
-class DiscLimits(NamedTuple):
-    """Limits of the disc in a cell's middle, whose mean is the cell's level.
-
-    Attributes:
-        disc_share: of the inscribed circle's radius, the disc of a cell's level at most. Chosen.
-        first_disc_share: the same where nothing is drawn yet, and the neighbours' ink bleeds into the disc. Chosen.
-        clear_sigma: in units of the blur, the distance of the disc from the cell's sides. Chosen.
-        min_radius_px: px, of the disc. Chosen.
-    """
-
-    disc_share: float = 0.55
-    first_disc_share: float = 0.47
-    clear_sigma: float = 2.2
-    min_radius_px: float = 0.75
-
-
-class InkLevelLimits(NamedTuple):
-    """Limits of ink levels.
-
-    Attributes:
-        cells_for_terms: from so many cells on, so many terms of an ink's polynomial. Derived: polynomials of degree 3,
-            2, 1 and 0 have so many; the cells are chosen.
-        disc: of the disc in a cell's middle.
-        polynomial: of the robust fit.
-    """
-
-    cells_for_terms: tuple[tuple[int, int], ...] = ((40, 10), (18, 6), (8, 3), (1, 1))
-    disc: DiscLimits = DiscLimits()
-    polynomial: PolynomialLimits = POLYNOMIAL_LIMITS
-
-
-LIMITS = InkLevelLimits()
 
 
 class InkLevels(NamedTuple):
@@ -70,4 +34,4 @@ class InkLevels(NamedTuple):
 
 def level_change(before: NDArray[np.float64], now: NDArray[np.float64]) -> float:
     """The median change of the cells' levels (K, 3), in units of their median level."""
-    return float(native.level_change(before, now))
+    return native.level_change(before, now)

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from extractor.cells.cells import EFFORTS, Cells, find_cells
-from extractor.cells.region_growing import LIMITS, MAX_GROWN_AREA, grow
+from extractor.cells.region_growing import MAX_GROWN_AREA, grow
 from extractor.image.pyramid import PyramidLevel
 from tests.support.layouts import small_layout
 from tests.support.pictures import extractor, picture
 
 Image = NDArray[np.uint8]
 PITCH_PX = 26.0
+THRESHOLD = 0.15  # as in the article, below eq. 3
 
 
 def view_of(image: Image) -> PyramidLevel:
@@ -50,7 +51,7 @@ def plain_growing(hsv: Image, seed: tuple[int, int], taken: NDArray[np.bool_]) -
         product = there @ mean
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = np.sqrt(((there - mean) ** 2).sum(axis=1)) / np.sqrt(product)
-        similar = (product > 0) & (distance < LIMITS.threshold)
+        similar = (product > 0) & (distance < THRESHOLD)
         if not similar.any():
             return region
         wave = ring

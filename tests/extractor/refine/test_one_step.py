@@ -22,7 +22,7 @@ def test_a_step_leaves_a_seventh_of_independent_errors_at_most(monkeypatch: pyte
     """Markers that are off by themselves bend the gridlines around others, too; a step that does not know leaves 0.17
     of the errors, and more at the rim.
     """
-    steps, limits = SynthesisSolver.steps, synthesis_steps.LIMITS
+    steps, max_steps = SynthesisSolver.steps, synthesis_steps.MAX_STEPS
     calls: list[tuple[Any, ...]] = []
 
     def keep(solver: SynthesisSolver, view: Any, estimate: Any, schedule: Any) -> Any:
@@ -35,11 +35,11 @@ def test_a_step_leaves_a_seventh_of_independent_errors_at_most(monkeypatch: pyte
     for pattern in ("honeycomb", "round", "elliptical"):
         for seed in range(2):
             seen = shown(pattern, layers=LAYERS, size=(320, 280), camera=Camera(20.0), seed=seed)
-            monkeypatch.setattr(synthesis_steps, "LIMITS", limits)
+            monkeypatch.setattr(synthesis_steps, "MAX_STEPS", max_steps)
             extractor(pattern, "balanced", LAYERS).extract(seen.image)
             solver, view, last, schedule = calls[-1]
             error = rng.normal(0.0, ERROR_PX, last.measured.shape)
             moved = last._replace(measured=last.measured + error, reliable=last.reliable + error)
-            monkeypatch.setattr(synthesis_steps, "LIMITS", limits._replace(max_steps=1))
+            monkeypatch.setattr(synthesis_steps, "MAX_STEPS", 1)
             left.append(steps(solver, view, moved, schedule).measured - last.measured)
     assert np.sqrt(np.mean(np.concatenate(left) ** 2)) < ERROR_PX / 7

@@ -90,4 +90,4 @@ def _nearest_neighbours(centre_mm: Points) -> Ints:
 
 def best_entries(entries_mm: Points, order: Ints) -> Ints:
     """(N,) the entry points with the shortest tour through the cells (N, K, 2) in this order (dynamic programming)."""
-    return native.best_entries(entries_mm, order)  # type: ignore[no-any-return]
+    return native.best_entries(entries_mm, order)

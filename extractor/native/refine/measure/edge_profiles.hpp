@@ -8,25 +8,31 @@
 
 #include "base/array.hpp"
 #include "image/pyramid.hpp"
-#include "refine/estimate.hpp"
+#include "refine/measure/matched_filter.hpp"
 
 namespace cmp::refine {
 
 inline constexpr std::size_t BLUR_TABLE = 7;  // entries of the tables of apparent and true blur
 
-// Limits of profiles and of their blur; explained in extractor/refine/measure/edge_profiles.py.
+// Limits of profiles and of their blur.
 struct EdgeProfileLimits {
-  double min_contrast, min_sine, max_reach, max_reach_share, middle_share;
-  Index min_blur_gridlines;
-  double bilinear_px2;
-  std::array<double, BLUR_TABLE> apparent_blur, true_blur;
-
-  template <class F>
-  static EdgeProfileLimits read(const F& f) {
-    return {f["min_contrast"],    f["min_sine"],      f["max_reach"],
-            f["max_reach_share"], f["middle_share"],  f["min_blur_gridlines"],
-            f["bilinear_px2"],    f["apparent_blur"], f["true_blur"]};
-  }
+  double min_contrast = 12.0;  // gray levels; a gridline with less is not read. Chosen.
+  double min_sine = 0.05;      // of the angles at a gridline's ends, at least. Chosen.
+  // of the cell's height, the reach of a profile to each side. Derived: as in MatchedFilterLimits.
+  double max_reach = MatchedFilterLimits{}.max_reach;
+  // of the distance to the next gridline, the reach of a blur profile; 0.41 in a regular cell. Chosen.
+  double max_reach_share = 0.45;
+  double middle_share = 0.4;      // of the gridline, from its ends to the nearest of the profiles. Chosen.
+  Index min_blur_gridlines = 12;  // clear of other gridlines, below which all gridlines are taken. Chosen.
+  // px^2, mean variance that bilinear sampling adds to the blur. Derived: the mean of f (1 - f) over the
+  // fractions f of a pixel.
+  double bilinear_px2 = 1.0 / 6;
+  // in units of the cell's height, one for the other. Wide blur mixes the neighbours' inks into the middles
+  // that the contrasts are taken from, which makes profiles look too steep (rendered honeycombs). The native
+  // code has room for as many. Measured on these, by no command that is kept.
+  std::array<double, BLUR_TABLE> apparent_blur = {0.0, 0.092, 0.112, 0.128, 0.137, 0.149, 0.154};
+  // for each apparent blur. Measured likewise.
+  std::array<double, BLUR_TABLE> true_blur = {0.0, 0.093, 0.117, 0.14, 0.16, 0.195, 0.225};
 };
 
 // The space around each gridline, (E, 4): px, the height of the lower cell beside the gridline; the sines of

@@ -1,38 +1,52 @@
 // Bending of the gridlines beyond the smooth map: two more unknowns for each gridline, free where markers are
 // rough.
 //
-// A gridline deviates from the map's cubic by t (1 - t) (b + s (1 - 2 t)), t along the chord. Both unknowns
-// are eliminated from a gridline's sums before the markers are solved, and computed afterwards.
+// The map that the markers define is smooth over two rings of markers. Where an object's rim lies between
+// markers, or slips, gridlines bend more sharply. The sharpness is limited by the third differences of the
+// markers along their gridlines, which are 0 where the map is quadratic. A gridline then deviates from the
+// map's cubic by
+//
+//    t (1 - t) (b + s (1 - 2 t)),
+//
+// t along the chord, b and s of zero mean and a deviation that is a share of these differences. The share,
+// from min_bend_share to max_bend_share, follows from the surrounding gridlines: their bending above the part
+// that noise explains. Both unknowns are eliminated from a gridline's sums before the markers are solved, and
+// computed afterwards.
 #pragma once
 
 #include "base/array.hpp"
 #include "refine/measure/gridline_weights.hpp"
 #include "refine/measure/marker_scatter.hpp"
+#include "refine/synthesis/pixel_rows.hpp"
 
 namespace cmp::refine {
 
-// Limits of bending; explained in extractor/refine/measure/gridline_bending.py.
+// Limits of the bending b and s.
 struct BendingLimits {
-  double min_bend_share, max_bend_share, bend_to_end_shift, max_bend_deviation, third_difference_noise;
-  double mean_over_median, misfit_tolerance, max_misfit_tolerance, min_significance, max_bend;
-  double min_determinant_share, min_information_share, band;
-
-  template <class F>
-  static BendingLimits read(const F& f) {
-    return {f["min_bend_share"],
-            f["max_bend_share"],
-            f["bend_to_end_shift"],
-            f["max_bend_deviation"],
-            f["third_difference_noise"],
-            f["mean_over_median"],
-            f["misfit_tolerance"],
-            f["max_misfit_tolerance"],
-            f["min_significance"],
-            f["max_bend"],
-            f["min_determinant_share"],
-            f["min_information_share"],
-            f["band"]};
-  }
+  // b and s over the differences around them (RMS) where these are smooth, and at most; from the surfaces
+  // under balls that press, shear and twist. Measured on these, by no command that is kept.
+  double min_bend_share = 0.01, max_bend_share = 0.25;
+  // the shift of a gridline's ends that remains, in deviations of b and s; from these surfaces. Measured on
+  // them, likewise.
+  double bend_to_end_shift = 0.08;
+  double max_bend_deviation = 0.06;  // in units of the gridline's length. Chosen.
+  // the noise of four markers in a third difference, 1 + 9 + 9 + 1, in two axes, with some allowance for its
+  // scatter. Derived: twice 20, times an allowance of 2, which is chosen.
+  double third_difference_noise = 2.0 * 20.0 * 2.0;
+  // a mean of squares against their median. Chosen near the 2.2 of the square of a normal variable.
+  double mean_over_median = 2.0;
+  double misfit_tolerance = 25.0;     // five deviations of the shift of the ends, squared. Chosen.
+  double max_misfit_tolerance = 0.1;  // the most of that, in units of the blur, squared. Chosen.
+  double min_significance = 3.0;      // deviations by which bending must exceed its noise. Chosen.
+  double max_bend = 0.3;              // b and s, in units of the gridline's length. Chosen.
+  // of the product of the sums at both ends; a gridline whose determinant is smaller does not show bending.
+  // Chosen.
+  double min_determinant_share = 1e-6;
+  // of the information about b with both ends held; a gridline with less does not show bending. Chosen.
+  double min_information_share = 0.001;
+  // in units of the blur, the distance from a gridline within which pixels count. Derived: as in
+  // PixelRowLimits.
+  double band = PixelRowLimits{}.band;
 };
 
 // The four markers in a row along each edge.

@@ -4,18 +4,20 @@
 
 #include "base/array.hpp"
 #include "image/pyramid.hpp"
+#include "refine/synthesis/pixel_rows.hpp"
 
 namespace cmp::refine {
 
-// Limits of the offsets; explained in extractor/refine/measure/gridline_offsets.py.
+// Limits of the offsets.
 struct OffsetLimits {
-  double min_weight_sum, min_offset_weight, band;
-  Index min_profile_gridlines;
-
-  template <class F>
-  static OffsetLimits read(const F& f) {
-    return {f["min_weight_sum"], f["min_offset_weight"], f["band"], f["min_profile_gridlines"]};
-  }
+  // of the squared weights of pixels at a virtual marker, in units of the squared contrast. Chosen.
+  double min_weight_sum = 0.08;
+  double min_offset_weight = 0.4;  // of a gridline, for its offsets to be measured. Chosen.
+  // in units of the blur, the distance from a gridline within which pixels count. Derived: as in
+  // PixelRowLimits.
+  double band = PixelRowLimits{}.band;
+  // of an ink; with no more, its profile is taken as 0. Chosen, as for the dot gain.
+  Index min_profile_gridlines = 40;
 };
 
 // The gridlines and the levels beside them, where refinement last compared the image with the pattern.
@@ -29,11 +31,8 @@ struct GridlineReading {
   double sigma;                           // px, the blur
   double noise;                           // gray levels
 
-  template <class F>
-  static GridlineReading read(const F& f) {
-    return {f["lines"],          f["sides"],           f["added"], f["weight"],
-            f["variance_ratio"], f["dot_gain_offset"], f["sigma"], f["noise"]};
-  }
+  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, added, weight,
+             variance_ratio, dot_gain_offset, sigma, noise)
 };
 
 // The offsets of the gridlines around their virtual markers, count of each gridline.

@@ -5,30 +5,32 @@
 
 namespace cmp::refine {
 
-// Limits of weights, noise and steps; explained in extractor/refine/measure/gridline_weights.py.
+// Limits of the gridlines' weights, of the noise and of a step.
 struct GridlineWeightLimits {
-  double min_noise, prior_hidden_px, informed_factor, min_information_share, rim_deviation_px;
-  double min_clean_share, min_marker_weight, min_sigma_px, max_blur_change;
-  double chance_factor, chance_deviations, min_misfit, min_determinant_share, min_determinant, min_edge_px;
-
-  template <class F>
-  static GridlineWeightLimits read(const F& f) {
-    return {f["min_noise"],
-            f["prior_hidden_px"],
-            f["informed_factor"],
-            f["min_information_share"],
-            f["rim_deviation_px"],
-            f["min_clean_share"],
-            f["min_marker_weight"],
-            f["min_sigma_px"],
-            f["max_blur_change"],
-            f["chance_factor"],
-            f["chance_deviations"],
-            f["min_misfit"],
-            f["min_determinant_share"],
-            f["min_determinant"],
-            f["min_edge_px"]};
-  }
+  double min_noise = 0.3;        // gray levels. Derived: rounding alone makes 0.29.
+  double prior_hidden_px = 1.0;  // prior deviation of a hidden marker from its prediction. Chosen.
+  // of the prior information about a hidden marker; markers with more count for the median information.
+  // Chosen.
+  double informed_factor = 3.0;
+  // of that median; a marker with less does not guide its neighbours' gridlines. Chosen.
+  double min_information_share = 0.04;
+  // at the rim, a marker with enough weight and a smaller deviation guides them all the same: the map of
+  // markers on one side only is less precise. Chosen.
+  double rim_deviation_px = 0.05;
+  // of the gridlines with weight 1, from which on the noise is that of all gridlines. Chosen.
+  double min_clean_share = 0.68;
+  // mean weight of the gridlines at a marker, for the marker to count. Chosen.
+  double min_marker_weight = 0.3;
+  double min_sigma_px = 0.4;     // of the blur. Derived: the bare pixel has 0.29.
+  double max_blur_change = 0.3;  // of the blur, in one step. Chosen.
+  // of the median misfit, and deviations above it; a misfit up to their sum is explained by chance. Chosen.
+  double chance_factor = 1.25, chance_deviations = 5.0;
+  // gray levels^2; the least misfit by which is divided. Derived: it only keeps a division from failing.
+  double min_misfit = 1e-12;
+  // of the squared sum over both ends, and of a gridline without any; the least determinant of a gridline's
+  // ends by which is divided. Derived: it only keeps a division from failing.
+  double min_determinant_share = 1e-9, min_determinant = 1e-12;
+  double min_edge_px = 1.0;  // of the median length of the edges. Chosen.
 };
 
 // Gradients of the log-likelihood by shifts of the gridlines' ends, times the noise's variance.

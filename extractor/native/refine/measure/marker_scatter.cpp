@@ -81,9 +81,9 @@ Array<ThirdDifference, 1> fourth_differences(View<const ThirdDifference, 1> thir
 
 }  // namespace
 
-ScatterFigures measure_scatter(View<const double, 2> xy, View<const double, 3> maps,
-                               View<const double, 2> diagonal, const layout::Topology& topology,
-                               const ScatterLimits& limits) {
+MarkerScatter measure_scatter(View<const double, 2> xy, View<const double, 3> maps,
+                              View<const double, 2> diagonal, const layout::Topology& topology,
+                              const ScatterLimits& limits) {
   const Array<ThirdDifference, 1> third = third_differences(xy, maps, topology);
   const Variances of_third = variances_of(third, limits.quantile);
   const Variances of_fourth = variances_of(fourth_differences(third, topology), limits.quantile);

@@ -7,18 +7,26 @@
 
 namespace cmp::refine {
 
-// Limits of that error; explained in extractor/refine/solve/convergence.py.
+// Limits of the remaining error after the last step.
 struct ConvergenceLimits {
-  double remaining_share, max_remaining_share, max_shrinking, mean_over_median;
-
-  template <class F>
-  static ConvergenceLimits read(const F& f) {
-    return {f["remaining_share"], f["max_remaining_share"], f["max_shrinking"], f["mean_over_median"]};
-  }
+  double remaining_share = 1.0;      // of a step, per blur, that another step would still correct. Chosen.
+  double max_remaining_share = 0.5;  // of a step, at most. Chosen.
+  // of a marker's last step over the step before, at most; the following steps would shrink by the same
+  // factor. Chosen: the following steps together are at most as long as the last one, because a factor from
+  // two steps is uncertain.
+  double max_shrinking = 0.5;
+  // of squares, by which the median of the squared shifts becomes their mean. Derived: 1 / ln 2, of the sum
+  // of two normal squares.
+  double mean_over_median = 1.44;
 };
 
-// shift, cov_px2 and error of StepRemainder.
-using StepRemainder = std::tuple<Array<double, 2>, Array<double, 3>, double>;
+struct StepRemainder {
+  Array<double, 2> shift;    // (M, 2) px
+  Array<double, 3> cov_px2;  // (M, 2, 2)
+  double error;              // standard deviations of one axis
+
+  CMP_RECORD("extractor.refine.solve.convergence.StepRemainder", shift, cov_px2, error)
+};
 
 // The error that the last step left.
 //

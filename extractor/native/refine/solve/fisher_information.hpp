@@ -11,16 +11,14 @@ struct Information {
   View<const double, 2> diagonal;      // (M, 3) xx, xy, yy of every marker
   View<const double, 2> off_diagonal;  // (E, 4) xx, xy, yx, yy from an edge's smaller to its larger marker
 
-  template <class F>
-  static Information read(const F& f) {
-    return {f["diagonal"], f["off_diagonal"]};
-  }
+  CMP_RECORD("extractor.refine.solve.fisher_information.Information", diagonal, off_diagonal)
 };
 
 // The same, with memory of its own.
 struct InformationArrays {
   Array<double, 2> diagonal, off_diagonal;
 
+  CMP_RECORD("extractor.refine.solve.fisher_information.Information", diagonal, off_diagonal)
   operator Information() const { return {diagonal, off_diagonal}; }
 };
 
@@ -38,17 +36,16 @@ struct GridlineSystem {
   double scatter_share;                // 0 to 1, as in MarkerScatter
 };
 
-// Limits of the information; explained in extractor/refine/solve/fisher_information.py.
+// Limits of the information, of its solution and of its inverse.
 struct InformationLimits {
-  double held_information;
-  Index max_steps;
-  double precision, min_determinant;
+  // 1/px^2, of a marker that is held in place. Derived: more than any image holds.
+  double held_information = 1000000000000.0;
+  Index max_steps = 80;      // of the conjugate gradients. Chosen.
+  double precision = 0.003;  // of the solution, relative. Chosen.
+  // of a marker's block, relative to its squared trace; with less a direction is unknown, and the marker has
+  // no covariance. Chosen.
+  double min_determinant = 1e-6;
   SharedPixelLimits shared;
-
-  template <class F>
-  static InformationLimits read(const F& f) {
-    return {f["held_information"], f["max_steps"], f["precision"], f["min_determinant"], f["shared"]};
-  }
 };
 
 // (E, 3) how much more than straight lines the gridlines move with their start, with their end, and with the

@@ -1,4 +1,7 @@
 // The pixels near a marker, which the gridlines that meet there share.
+//
+// The derivatives by two gridlines with the directions a and b overlap by the integrals of t^i u^j exp(-|t a
+// - u b|^2 / 4 s^2) / 4 pi s^2 over the two rays, which have closed forms.
 #pragma once
 
 #include <array>
@@ -14,16 +17,29 @@ struct GridlineSystem;
 
 inline constexpr Index CLOSED_FORM_TERMS = 9;
 
-// Limits of shared pixels; explained in extractor/refine/solve/shared_pixels.py.
+// Limits of shared pixels, and the closed forms between them.
 struct SharedPixelLimits {
-  double max_cosine, min_end_information, min_uncut_information;
-  std::array<double, CLOSED_FORM_TERMS> plain_form, linear_form;
-
-  template <class F>
-  static SharedPixelLimits read(const F& f) {
-    return {f["max_cosine"], f["min_end_information"], f["min_uncut_information"], f["plain_form"],
-            f["linear_form"]};
-  }
+  // of the angle between two gridlines, as which a smaller angle counts. Derived: the cosine of 0.4 rad; the
+  // closed forms hold for long gridlines, which two at a smaller angle are not.
+  double max_cosine = 0.9210609940028851;
+  // least share of a gridline's information that is left where its ends are blurred. Chosen.
+  double min_end_information = 0.75;
+  // squared gray levels per px^2; the least information of a whole gridline by which is divided. Derived: it
+  // only keeps a division from failing.
+  double min_uncut_information = 1e-12;
+  // coefficients of r a and r^3 b as polynomials in r = sqrt(1 - cosine), accurate to 1e-7. With s the sine
+  // and p the angle between one gridline and the continuation of the other, a = p / s is the integral for i =
+  // j = 0 and b = (s + p cosine) / s^3 that for i = j = 1. Derived: fitted by numpy's Polynomial to 400 equal
+  // steps of r from max_cosine to -1 + 1e-3.
+  std::array<double, CLOSED_FORM_TERMS> plain_form = {
+      2.2214062300373105,  -0.9994802290228612,   0.5520335891256954,
+      -0.3210889875190351, 0.17923857580966263,   -0.0861060251550025,
+      0.03129883987192556, -0.007304348171856732, 0.0007986841926807503};
+  // Derived likewise.
+  std::array<double, CLOSED_FORM_TERMS> linear_form = {
+      1.110807604846207,    -0.0012936914563040358, -0.26929083534531123,
+      0.3018856779750332,   -0.235866054830842,     0.13721017833001403,
+      -0.05580030238590822, 0.013938322207913953,   -0.0015909046261314544};
 };
 
 inline constexpr std::size_t MARKER_LANES = 8;  // markers side by side

@@ -2,18 +2,16 @@
 #include "base/binding.hpp"
 
 #include "refine/synthesis/blur_bleed.hpp"
-#include "refine/synthesis/dot_gain.hpp"
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/ink_levels.hpp"
 
 namespace cmp::refine {
 
 void add_synthesis(nb::module_ module) {
-  bind<&gridlines>(module, "gridlines", {"xy", "maps", "bend", "edges", "along", "scatter_share", "limits"});
-  bind<&local_maps>(module, "local_maps", {"xy", "near", "offset", "stencil", "limits"});
+  bind<&gridlines>(module, "gridlines", {"xy", "maps", "bend", "edges", "along", "scatter_share"});
+  bind<&local_maps>(module, "local_maps", {"xy", "near", "offset", "stencil"});
   bind<&level_change>(module, "level_change", {"before", "now"});
-  bind<&remove_bleed>(module, "remove_bleed", {"levels", "color", "share", "median_share", "limits"});
-  bind<&markers_without_dot_gain>(module, "markers_without_dot_gain", {"xy", "cells", "dot_gain", "limits"});
+  bind<&remove_bleed>(module, "remove_bleed", {"levels", "color", "share", "median_share"});
 }
 
 }  // namespace cmp::refine

@@ -47,9 +47,9 @@ LevelArrays remove_bleed(const InkLevels& levels, View<const std::int32_t, 1> co
                          View<const double, 1> share, double median_share, const BleedLimits& limits) {
   LevelArrays out{Array<double, 2>(levels.cell), Array<double, 3>(levels.slope),
                   Array<double, 2>(levels.black), Array<bool, 1>(levels.is_outlier)};
-  const auto cell = std::get<0>(out).view();
-  const auto slope = std::get<1>(out).view();
-  const auto black = std::get<2>(out).view();
+  const auto cell = out.cell.view();
+  const auto slope = out.slope.view();
+  const auto black = out.black.view();
   const double most = limits.max_bleed, middle = std::min(median_share, most);
   std::array<double, 3> total{};
   Array<double, 1> own({cell.size()});

@@ -10,15 +10,10 @@
 
 namespace cmp::refine {
 
-// Limits of bleed; explained in extractor/refine/synthesis/blur_bleed.py.
+// Limits of bleed.
 struct BleedLimits {
-  double max_bleed;
+  double max_bleed = 0.1;  // share of a neighbour in a cell's mean, the most that is corrected. Chosen.
   DiscLimits disc;
-
-  template <class F>
-  static BleedLimits read(const F& f) {
-    return {f["max_bleed"], f["disc"]};
-  }
 };
 
 // (K,) the share of each neighbour in the means of the cells, NaN where a corner is unknown; and their

@@ -19,15 +19,11 @@ inline constexpr Index X = 0, Y = 1, UX = 2, UY = 3, LENGTH = 4, LEAVE = 5, ARRI
 inline constexpr Index LINE_COLUMNS = 8;
 inline constexpr Index FIRST_RING = 6;
 
-// Limits of gridlines; explained in extractor/refine/synthesis/gridlines.py.
+// Limits of gridlines.
 struct GridlineLimits {
-  double max_slope, min_length_px;
+  double max_slope = 0.5;  // of a gridline against its chord; a larger slope is an error of the map. Chosen.
+  double min_length_px = 1.0;  // px, of the chord; no shorter gridline is known. Chosen.
   localmap::RegularisedMapLimits maps;
-
-  template <class F>
-  static GridlineLimits read(const F& f) {
-    return {f["max_slope"], f["min_length_px"], f["maps"]};
-  }
 };
 
 // Markers (M, 2) px with predictions, and (M,) the predicted ones.

@@ -46,9 +46,9 @@ double difference_slope(View<const double, 1> f, View<const double, 1> b, double
 void fill_levels(View<const double, 2> own, View<const double, 2> centroids,
                  View<const std::int32_t, 1> color, const InkPolynomials& inks, double scale,
                  LevelArrays& levels) {
-  const auto cell = std::get<0>(levels).view();
-  const auto slope = std::get<1>(levels).view();
-  const auto is_outlier = std::get<3>(levels).view();
+  const auto cell = levels.cell.view();
+  const auto slope = levels.slope.view();
+  const auto is_outlier = levels.is_outlier.view();
   for (Index i = 0; i < own.size(); ++i) {
     // where a corner is unknown, the cell may be drawn in the next step, when that corner is predicted
     const bool is_placed = std::isfinite(centroids(i, 0));
@@ -206,9 +206,9 @@ LevelArrays smoothed_levels(View<const double, 2> drawn, View<const double, 2> b
         robust_polynomial(own.terms, own.values, inks.noise[ink], terms_for(n, limits), limits.polynomial);
     copy<double, 2>(fitted.coefficients, inks.coefficients[ink]);
     inks.variance[ink] = ink == WHITE ? WHITE_VARIANCE : fitted.variance;
-    for (Index i = 0; i < n && ink != BLACK; ++i) std::get<3>(levels)[own.numbers[i]] = fitted.is_outlier[i];
+    for (Index i = 0; i < n && ink != BLACK; ++i) levels.is_outlier[own.numbers[i]] = fitted.is_outlier[i];
   }
-  copy<double, 2>(inks.coefficients[BLACK], std::get<2>(levels));
+  copy<double, 2>(inks.coefficients[BLACK], levels.black);
   fill_levels(drawn, centroids, pattern.color, inks, view.frame.scale, levels);
   return levels;
 }

@@ -19,26 +19,22 @@ namespace cmp::refine {
 inline constexpr Index INKS = 5;  // red, green, blue, black, white
 inline constexpr Index BLACK = 3, WHITE = 4;
 
-// Limits of the disc in a cell's middle; explained in extractor/refine/synthesis/ink_levels.py.
+// Limits of the disc in a cell's middle, whose mean is the cell's level.
 struct DiscLimits {
-  double disc_share, first_disc_share, clear_sigma, min_radius_px;
-
-  template <class F>
-  static DiscLimits read(const F& f) {
-    return {f["disc_share"], f["first_disc_share"], f["clear_sigma"], f["min_radius_px"]};
-  }
+  double disc_share = 0.55;  // of the inscribed circle's radius, the disc of a cell's level at most. Chosen.
+  // the same where nothing is drawn yet, and the neighbours' ink bleeds into the disc. Chosen.
+  double first_disc_share = 0.47;
+  double clear_sigma = 2.2;  // in units of the blur, the distance of the disc from the cell's sides. Chosen.
+  double min_radius_px = 0.75;  // px, of the disc. Chosen.
 };
 
-// Limits of ink levels; explained in extractor/refine/synthesis/ink_levels.py.
+// Limits of ink levels.
 struct InkLevelLimits {
-  std::array<std::array<Index, 2>, 4> cells_for_terms;  // from so many cells on, so many terms
+  // from so many cells on, so many terms of an ink's polynomial. Derived: polynomials of degree 3, 2, 1 and 0
+  // have so many; the cells are chosen.
+  std::array<std::array<Index, 2>, 4> cells_for_terms = {{{40, 10}, {18, 6}, {8, 3}, {1, 1}}};
   DiscLimits disc;
   PolynomialLimits polynomial;
-
-  template <class F>
-  static InkLevelLimits read(const F& f) {
-    return {f["cells_for_terms"], f["disc"], f["polynomial"]};
-  }
 };
 
 // The levels of the inks in an image, as light (0 to 255).
@@ -48,17 +44,21 @@ struct InkLevels {
   View<const double, 2> black;     // (3, 10) the polynomial of the black
   View<const bool, 1> is_outlier;  // (K,) cells that do not look like the other cells of their ink
 
-  template <class F>
-  static InkLevels read(const F& f) {
-    return {f["cell"], f["slope"], f["black"], f["is_outlier"]};
-  }
+  CMP_RECORD("extractor.refine.synthesis.ink_levels.InkLevels", cell, slope, black, is_outlier)
 };
 
-// The fields of InkLevels as arrays that own their elements.
-using LevelArrays = std::tuple<Array<double, 2>, Array<double, 3>, Array<double, 2>, Array<bool, 1>>;
+// The same, owned.
+struct LevelArrays {
+  Array<double, 2> cell;
+  Array<double, 3> slope;
+  Array<double, 2> black;
+  Array<bool, 1> is_outlier;
+
+  CMP_RECORD("extractor.refine.synthesis.ink_levels.InkLevels", cell, slope, black, is_outlier)
+};
 
 inline InkLevels levels_of(const LevelArrays& arrays) {
-  return {std::get<0>(arrays), std::get<1>(arrays), std::get<2>(arrays), std::get<3>(arrays)};
+  return {arrays.cell, arrays.slope, arrays.black, arrays.is_outlier};
 }
 
 // The cells of the pattern by ink.

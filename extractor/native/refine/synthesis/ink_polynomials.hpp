@@ -14,17 +14,20 @@ inline Monomials monomials(double x, double y) {
   return {1.0, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y};
 }
 
-// Limits of a robust fit; explained in extractor/refine/synthesis/ink_polynomials.py.
+// Limits of a robust fit.
 struct PolynomialLimits {
-  double outlier_tolerance, min_outlier_misfit;
-  Index max_fit_rounds;
-  double falling_variance, saturation_per_px, weight_reach, expected_factor, ridge;
-
-  template <class F>
-  static PolynomialLimits read(const F& f) {
-    return {f["outlier_tolerance"], f["min_outlier_misfit"], f["max_fit_rounds"],  f["falling_variance"],
-            f["saturation_per_px"], f["weight_reach"],       f["expected_factor"], f["ridge"]};
-  }
+  double outlier_tolerance = 4.0;   // deviations of the scatter, beyond which a cell is an outlier. Chosen.
+  double min_outlier_misfit = 4.0;  // gray levels^2, added to that tolerance. Chosen.
+  Index max_fit_rounds = 10;        // rounds of weighting. Chosen.
+  double falling_variance = 0.9;    // rounds end when the scatter falls to no less than this share. Chosen.
+  // 1/px; a cell of n pixels weighs n / (1 + saturation_per_px n) before the first round. Chosen.
+  double saturation_per_px = 0.1;
+  // in units of the scatter, the misfit where a cell's weight is a quarter. Chosen.
+  double weight_reach = 6.0;
+  // of the variance expected from noise, the part that is no scatter of the cells. Chosen.
+  double expected_factor = 1.15;
+  // added to the diagonal of the normal equations, in units of the cells' total weight. Chosen.
+  double ridge = 1e-6;
 };
 
 // A robust polynomial of one ink.

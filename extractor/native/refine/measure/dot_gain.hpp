@@ -11,15 +11,14 @@
 
 namespace cmp::refine {
 
-// Limits of dot gain; explained in extractor/refine/synthesis/dot_gain.py.
+// Limits of dot gain.
 struct DotGainLimits {
-  Index min_gridlines, max_gridlines;
-  double min_dot_gain, min_sine;
-
-  template <class F>
-  static DotGainLimits read(const F& f) {
-    return {f["min_gridlines"], f["max_gridlines"], f["min_dot_gain"], f["min_sine"]};
-  }
+  // gridlines that the dot gain is measured from; with no more than the least, it is taken as 0, and of more
+  // than the most, every n-th is used. Chosen.
+  Index min_gridlines = 40, max_gridlines = 250;
+  // in units of the blur; drawings, compression and glare look like less, which is taken as 0. Chosen.
+  double min_dot_gain = 0.1;
+  double min_sine = 0.2;  // of the angle of a corner; a sharper corner moves no farther. Chosen.
 };
 
 // px, the dot gain: the median shift outward of the sides of cells at the pattern's rim; 0 where the shift is

@@ -1,4 +1,4 @@
-#include "refine/synthesis/dot_gain.hpp"
+#include "refine/measure/dot_gain.hpp"
 
 #include <cmath>
 
