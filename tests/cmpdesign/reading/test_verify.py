@@ -79,7 +79,7 @@ def test_the_other_side_is_found_out() -> None:
     assert verify(either, image).reason == (
         f"{seen}: a mirrored camera or the pad's other face, by the colors of the inks"
     )
-    assert "red and blue are swapped" in str(verify(either, reference(), image[:, ::-1, ::-1]).reason)
+    assert "red and blue are swapped" in str(verify(either, image[:, ::-1, ::-1]).reason)
 
 
 @pytest.mark.parametrize(("lost", "verified"), [(6, True), (7, False)])
