@@ -14,6 +14,9 @@ ifeq ($(shell command -v $(CXX) || command -v g++ || command -v clang++),)
   ZIG := --zig
 endif
 
+# The tests start some hundred programs, each of which would compile its modules again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help setup demo test test-all test-sanitized lint bench figures docs lock wheel clean
 
 help:
@@ -65,7 +68,7 @@ lint: $(READY) $(CORE)
 bench: $(READY) $(CORE)
 	@set -e; for name in extraction accuracy comparison datasets photoreal; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done
 	@$(BIN)/python -m tools.figures
-	@set -e; for name in startup numbering tracking rendering contact large_strain reconstruction medium laser kerf molds stress damage calibration camera codecs live sweeps views; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
+	@set -e; for name in startup interrupts numbering tracking rendering contact large_strain reconstruction medium laser kerf molds stress damage calibration camera codecs live sweeps views; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
 
 figures: $(READY) $(CORE)
 	@$(BIN)/python -m tools.figures

@@ -7,3 +7,6 @@ if("$ENV{ZIG_TARGET}" MATCHES "^aarch64")
   set(CMAKE_SYSTEM_NAME Linux)
   set(CMAKE_SYSTEM_PROCESSOR aarch64)
 endif()
+# links share the cache of the compiled C++ library, and processes of zig may wait for each other's locks for ever
+set_property(GLOBAL PROPERTY JOB_POOLS zig_links=1)
+set(CMAKE_JOB_POOL_LINK zig_links)

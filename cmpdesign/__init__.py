@@ -22,15 +22,16 @@ The rooms of the package, each of which imports only rooms above it, left column
                                                    data      data sets made on many machines
                                                    api, cli  the calls, and the command line
 
-Public names are loaded at their first use, so that ``import cmpdesign`` takes milliseconds.
+Public names are loaded at their first use, and this file imports nothing: until ``main`` runs, Ctrl-C ends in a
+traceback.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # type checkers take this name for true, wherever it comes from
 if TYPE_CHECKING:
+    from typing import Any
+
     from cmpdesign.api.calibration import calibrate_camera as calibrate_camera
     from cmpdesign.api.calibration import calibrate_rig as calibrate_rig
     from cmpdesign.api.datasets import dataset as dataset
@@ -153,6 +154,8 @@ __all__ = sorted([*_HOMES, "__version__"])
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'cmpdesign' has no attribute {name!r}")
+    from importlib import import_module
+
     return getattr(import_module(_HOMES[name]), name)
 
 

@@ -123,9 +123,16 @@ class GridFieldPart(Part):
     windows: dict[int, Literal["through", "marked", "unmarked"]] = Field(
         description="Passes -> what is seen."
     )
+    depths_mm: dict[int, tuple[float, float]] = Field(
+        description="Passes -> least and most depth, by the windows that are cut through; open: the thickness."
+    )
     passes: int | None = Field(description="Fewest passes that cut through; null: none.")
-    least_depth_per_pass_mm: float | None = Field(description="Thickness over these passes.")
-    most_depth_per_pass_mm: float | None = Field(description="Null: the first window is open already.")
+    least_depth_per_pass_mm: float = Field(
+        description="By this field and by those of less power or more speed."
+    )
+    most_depth_per_pass_mm: float | None = Field(
+        description="By this field and by those of more power or less speed; null: no window gives a limit."
+    )
 
 
 class GridDocument(Document):

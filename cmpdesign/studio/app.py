@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from cmpdesign import __version__
+from cmpdesign.api.sequences import cameras
 from cmpdesign.design.templates import templates
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.documents import parse_json
@@ -18,19 +20,28 @@ from cmpdesign.studio import designs, pictures
 from cmpdesign.studio.builds import Builds
 from cmpdesign.studio.designs import Look
 from cmpdesign.studio.guard import Door, Guard
-from cmpdesign.studio.live import CameraReader, LiveFeed, frame_document, hello_document, shown_image
+from cmpdesign.studio.live import (
+    CameraReader,
+    LiveFeed,
+    frame_document,
+    hello_document,
+    obey,
+    open_camera,
+    shown_image,
+)
 from cmpdesign.studio.readings import MOST_PICTURE_BYTES, Readings
-from extractor import ExtractorError
+from cmpdesign.studio.recording import KINDS, Recordings
+from extractor import ExtractorError, Reference
 
 with extra("studio"):
     from starlette.applications import Starlette
     from starlette.concurrency import run_in_threadpool
-    from starlette.requests import Request
+    from starlette.requests import HTTPConnection, Request
     from starlette.responses import JSONResponse, Response
     from starlette.routing import Route, WebSocketRoute
     from starlette.websockets import WebSocket, WebSocketDisconnect
 
-MOST_TEXT_BYTES = 1 << 20
+MOST_TEXT_BYTES, MOST_LAYOUT_BYTES = 1 << 20, 64 << 20
 PAGE = Path(__file__).parent / "page"
 _KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -42,6 +53,12 @@ _KINDS = {
 }
 _SHOWN = (".svg", ".png", ".glb")  # other files of a build are downloads
 Call = Callable[[Request], Awaitable[Response]]
+_CALLS = {
+    "design": designs.design_document,
+    "remedy": designs.remedy_of,
+    "size": designs.proposed_design,
+    "laser": pictures.laser_document,
+}
 
 
 class _Refused(Exception):
@@ -55,6 +72,7 @@ class Studio:
     live: LiveFeed | None = None
     builds: Builds = field(default_factory=Builds)
     readings: Readings = field(default_factory=Readings)
+    recordings: Recordings = field(default_factory=Recordings)
 
     def routes(self) -> list[Route | WebSocketRoute]:
         """The addresses."""
@@ -63,57 +81,115 @@ class Studio:
             Route("/", _page_file, methods=get),
             Route("/page/{name}", _page_file, methods=get),
             Route("/api/start", self._start, methods=get),
+            Route("/api/cameras", _cameras, methods=get),
             Route("/api/templates/{name}.svg", _template, methods=get),
-            Route("/api/design", _design, methods=post),
-            Route("/api/remedy", _remedy, methods=post),
-            Route("/api/size", _size, methods=post),
+            *(Route(f"/api/{name}", _call(of), methods=post) for name, of in _CALLS.items()),
             Route("/api/toml", _toml, methods=post),
             Route("/api/seen", _seen, methods=post),
-            Route("/api/laser", _laser, methods=post),
             Route("/api/builds", self._build, methods=post),
             Route("/api/builds/{key}", self._build_state, methods=["GET", "DELETE"]),
             Route("/api/builds/{key}/all.zip", self._build_archive, methods=get),
             Route("/api/builds/{key}/files/{name:path}", self._build_file, methods=get),
+            Route("/api/layouts", self._layout, methods=post),
             Route("/api/readings", self._read, methods=post),
+            Route("/api/readings/{key}/moved", self._moved, methods=get),
             Route("/api/readings/{key}/report.zip", self._report, methods=get),
             Route("/api/readings/{key}/{stage}.jpg", self._picture, methods=get),
+            Route("/api/tracks", self._track, methods=post),
+            Route("/api/recordings/{key}", self._recording, methods=get),
             WebSocketRoute("/live/source", self._live),
-            WebSocketRoute("/live/camera", _camera),
+            WebSocketRoute("/live/machine", self._machine),
+            WebSocketRoute("/live/camera", self._camera),
         ]
+
+    def close(self) -> None:
+        """End all builds and remove all files."""
+        for kept in (self.builds, self.readings, self.recordings):
+            kept.close()
 
     async def _start(self, request: Request) -> Response:
         document = await run_in_threadpool(designs.start_document)
         source = None if self.live is None else self.live.name
-        return JSONResponse({"version": __version__, "live": source, **document})
+        return JSONResponse({"version": __version__, "live": source, "recorded": KINDS, **document})
 
     async def _live(self, socket: WebSocket) -> None:
-        """The latest frame of the run, each time that the page asks for one."""
-        feed = self.live
+        """The run of ``view``."""
         await socket.accept()
-        if feed is None:
+        if self.live is None:
             await socket.close(reason="there is no live source; start with: cmpdesign view LAYOUT SOURCE")
             return
-        count = -1
         with suppress(WebSocketDisconnect):
-            await socket.send_json(hello_document(feed.layout, feed.name))
-            while True:
-                if await socket.receive_text() == "rest":
-                    feed.reset_rest()
-                    continue
-                latest = None
-                while latest is None and not (feed.is_over and count >= 0):
-                    latest = await run_in_threadpool(feed.newer, count)
-                if latest is None:
-                    await socket.send_json({"over": feed.failure or "the source has ended"})
-                    return
-                count = latest.count
-                await socket.send_json(frame_document(latest.frame, latest.frames_per_s))
-                await socket.send_bytes(await run_in_threadpool(shown_image, latest.image))
+            await self._show(socket, self.live)
+
+    async def _machine(self, socket: WebSocket) -> None:
+        """A camera of this machine, for as long as the page looks at it."""
+        await socket.accept()
+        with suppress(WebSocketDisconnect):
+            try:
+                number = int(socket.query_params.get("camera", "0"))
+                feed = await run_in_threadpool(open_camera, self._layout_of(socket), number)
+            except (CmpDesignError, ExtractorError, ValueError) as error:
+                await socket.send_json({"over": str(error)})
+                return
+            try:
+                await self._show(socket, feed)
+            finally:
+                feed.stop()
+
+    async def _show(self, socket: WebSocket, feed: LiveFeed) -> None:
+        """The latest frame of a run, each time that the page asks for one."""
+        count = -1
+        await socket.send_json(hello_document(feed.layout, feed.name))
+        while True:
+            words = await socket.receive_text()
+            if words != "next":
+                answer = await run_in_threadpool(obey, feed, words, self.recordings)
+                if answer is not None:
+                    await socket.send_json(answer)
+                continue
+            latest = None
+            while latest is None and not (feed.is_over and count >= 0):
+                latest = await run_in_threadpool(feed.newer, count)
+            if latest is None:
+                await socket.send_json({"over": feed.failure or "the source has ended"})
+                return
+            count = latest.count
+            await socket.send_json(frame_document(latest.frame, latest.frames_per_s))
+            await socket.send_bytes(await run_in_threadpool(shown_image, latest.image))
+
+    async def _camera(self, socket: WebSocket) -> None:
+        """Frames of the browser's camera, read with the layout of a design; one frame is under way."""
+        await socket.accept()
+        with suppress(WebSocketDisconnect):
+            try:
+                layout = await run_in_threadpool(self._layout_of, socket)
+                reader = await run_in_threadpool(CameraReader, layout)
+            except (CmpDesignError, ExtractorError) as error:
+                await socket.send_json({"over": str(error)})
+                return
+            await socket.send_json(hello_document(layout, "the camera of this browser"))
+            try:
+                while (message := await socket.receive())["type"] != "websocket.disconnect":
+                    if (data := message.get("bytes")) is not None:
+                        answer: Any = await run_in_threadpool(reader.read, data)
+                    else:
+                        words = message.get("text") or ""
+                        answer = await run_in_threadpool(obey, reader, words, self.recordings)
+                    if answer is not None:
+                        await socket.send_json(answer)
+            finally:
+                reader.close()
+
+    def _layout_of(self, request: HTTPConnection) -> Reference:
+        """The layout that a request names: one that was opened, else that of the design."""
+        query = request.query_params
+        design = designs.design_of(parse_json(query.get("fields", "{}"), "the design"))
+        return self.readings.layout(design, query.get("layout", ""))
 
     async def _build(self, request: Request) -> Response:
         asked = await _asked(request)
         design = designs.design_of(asked.get("fields"))
-        names = [str(name) for name in asked.get("products") or ()]
+        names = _texts(asked, "products")
         return JSONResponse(self.builds.start(design, names, Look.of(asked).camera_px).document())
 
     async def _build_state(self, request: Request) -> Response:
@@ -136,24 +212,42 @@ class Studio:
             return Response(data, media_type=_KINDS[path.suffix])
         return _download(data, path.name)
 
+    async def _layout(self, request: Request) -> Response:
+        text = (await _body(request, MOST_LAYOUT_BYTES)).decode("utf-8", "replace")
+        return JSONResponse(await run_in_threadpool(self.readings.add_layout, text))
+
     async def _read(self, request: Request) -> Response:
         query = request.query_params
-        fields = parse_json(query.get("fields", "{}"), "the design")
-        reference = designs.design_of(fields).layout.reference()
+        design = designs.design_of(parse_json(query.get("fields", "{}"), "the design"))
         data = await _body(request, MOST_PICTURE_BYTES)
         name = query.get("name", "picture")[:100]
-        reading = await run_in_threadpool(self.readings.read, reference, name, data)
-        return JSONResponse(await run_in_threadpool(reading.document))
+        read = partial(self.readings.read, design, query.get("layout", ""), name, data)
+        return JSONResponse(await run_in_threadpool(read))
+
+    async def _moved(self, request: Request) -> Response:
+        rest = request.query_params.get("rest")
+        reading = self.readings.get(request.path_params["key"])
+        at_rest = None if rest is None else self.readings.get(rest)
+        return JSONResponse(await run_in_threadpool(reading.moved, at_rest))
 
     async def _picture(self, request: Request) -> Response:
-        reading = self.readings.get(request.path_params["key"])
-        return Response(
-            await run_in_threadpool(reading.picture, request.path_params["stage"]), media_type="image/jpeg"
-        )
+        path = request.path_params
+        picture = await run_in_threadpool(self.readings.picture, path["key"], path["stage"])
+        return Response(picture, media_type="image/jpeg")
 
     async def _report(self, request: Request) -> Response:
         reading = self.readings.get(request.path_params["key"])
         return _download(await run_in_threadpool(reading.report), "report.zip")
+
+    async def _track(self, request: Request) -> Response:
+        asked = await _asked(request)
+        keys, rest, kind = _texts(asked, "keys"), asked.get("rest"), str(asked.get("kind"))
+        rest = None if rest is None else str(rest)
+        return _download(await run_in_threadpool(self.readings.track, keys, rest, kind), f"run.{kind}")
+
+    async def _recording(self, request: Request) -> Response:
+        name, data = await run_in_threadpool(self.recordings.read, request.path_params["key"])
+        return _download(data, name)
 
 
 def make_app(door: Door, live: LiveFeed | None = None) -> Any:
@@ -167,8 +261,7 @@ def make_app(door: Door, live: LiveFeed | None = None) -> Any:
     @asynccontextmanager
     async def lifespan(app: Any) -> AsyncIterator[None]:
         yield
-        studio.builds.close()
-        studio.readings.close()
+        studio.close()
 
     app = Starlette(
         routes=studio.routes(),
@@ -204,28 +297,24 @@ async def _template(request: Request) -> Response:
     return Response(text, media_type=_KINDS[".svg"])
 
 
-async def _design(request: Request) -> Response:
-    asked = await _asked(request)
-    return JSONResponse(await run_in_threadpool(designs.design_document, asked.get("fields"), Look.of(asked)))
+def _call(of: Callable[[dict[str, Any]], dict[str, Any]]) -> Call:
+    """The answer of a function of the request's JSON object."""
+
+    async def answer(request: Request) -> Response:
+        return JSONResponse(await run_in_threadpool(of, await _asked(request)))
+
+    return answer
 
 
-async def _remedy(request: Request) -> Response:
-    asked = await _asked(request)
-    subject = str(asked.get("subject", ""))
+async def _cameras(request: Request) -> Response:
+    """The cameras of this machine by number; ``problem``: why they cannot be listed."""
+    try:
+        found = (await run_in_threadpool(cameras)).cameras
+    except CmpDesignError as error:
+        return JSONResponse({"cameras": [], "problem": str(error)})
     return JSONResponse(
-        await run_in_threadpool(designs.remedy_of, asked.get("fields"), subject, Look.of(asked))
+        {"cameras": [{"number": one.number, "name": one.name} for one in found], "problem": ""}
     )
-
-
-async def _size(request: Request) -> Response:
-    from cmpdesign.proposal.camera_design import size
-
-    asked = await _asked(request)
-    make, error = asked.get("make") or None, str(asked.get("error") or "") or None
-    view = str(asked.get("view", ""))
-    proposal = await run_in_threadpool(size, str(asked.get("camera", "")), view, error, make=make)
-    found = {"fields": designs.fields_of(proposal.design), "figures": proposal.figures()}
-    return JSONResponse(found)
 
 
 async def _toml(request: Request) -> Response:
@@ -235,36 +324,8 @@ async def _toml(request: Request) -> Response:
 
 async def _seen(request: Request) -> Response:
     """The pad as the camera sees it: the picture of ``render``, as PNG."""
-    asked = await _asked(request)
-    picture = await run_in_threadpool(pictures.seen_picture, asked.get("fields"), Look.of(asked))
+    picture = await run_in_threadpool(pictures.seen_picture, await _asked(request))
     return Response(picture, media_type=_KINDS[".png"])
-
-
-async def _laser(request: Request) -> Response:
-    asked = await _asked(request)
-    return JSONResponse(await run_in_threadpool(pictures.laser_document, asked.get("fields")))
-
-
-async def _camera(socket: WebSocket) -> None:
-    """Frames of the browser's camera, read with the layout of a design; one frame is under way."""
-    await socket.accept()
-    with suppress(WebSocketDisconnect):
-        try:
-            fields = parse_json(socket.query_params.get("fields", "{}"), "the design")
-            layout = designs.design_of(fields).layout.reference()
-            reader = await run_in_threadpool(CameraReader, layout)
-        except (CmpDesignError, ExtractorError) as error:
-            await socket.send_json({"over": str(error)})
-            return
-        await socket.send_json(hello_document(layout, "the camera of this browser"))
-        while True:
-            message = await socket.receive()
-            if message["type"] == "websocket.disconnect":
-                return
-            if message.get("bytes") is None:
-                reader.reset_rest()
-            else:
-                await socket.send_json(await run_in_threadpool(reader.read, message["bytes"]))
 
 
 async def _asked(request: Request) -> dict[str, Any]:
@@ -273,6 +334,14 @@ async def _asked(request: Request) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise _Refused(422, "the request is no JSON object")
     return document
+
+
+def _texts(asked: dict[str, Any], name: str) -> list[str]:
+    """The texts of a list in a request."""
+    match asked.get(name, []):
+        case [*items]:
+            return [str(item) for item in items]
+    raise _Refused(422, f"{name}: expected a list")
 
 
 async def _body(request: Request, most_bytes: int) -> bytes:

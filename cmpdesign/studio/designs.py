@@ -34,6 +34,7 @@ LIBRARIES = {
 _TABLES = ("palette", "fiducials", "laser", "mold", "sheet")
 _WORD = re.compile(r"[a-z_]+(?:\.[a-z_]+)?")
 _NOT_IN_FINDINGS = {"name", "description", "source", "extends"}
+MOST_CAMERA_PIXELS = 60_000_000
 _SIZE_FIELDS = ("pitch_mm", "layers", "width_mm", "height_mm")  # a finding on a size names one of them
 _STEPS = 64  # of a remedy, above and below the present value
 _STEP = 1.04  # ratio of such steps
@@ -49,16 +50,18 @@ class Look:
 
     @classmethod
     def of(cls, asked: Mapping[str, Any]) -> Look:
-        """The values of a request; what is missing or of another type has its usual value."""
-        width, height = (*map(str, asked.get("camera") or ()), "", "")[:2]
-        known = (
-            width.isdecimal()
-            and height.isdecimal()
-            and 10 <= int(width) < 10**5
-            and 10 <= int(height) < 10**5
-        )
-        camera_px = (int(width), int(height)) if known else (640, 480)
-        return cls(camera_px, asked.get("back") is True, str(asked.get("labels", "")))
+        """The values of a request; what is missing has its usual value.
+
+        Raises:
+            DesignError: no camera of 10 px a side or more, and of at most ``MOST_CAMERA_PIXELS``.
+        """
+        match asked.get("camera", [640, 480]):
+            case [int(width), int(height)] if (
+                min(width, height) >= 10 and width * height <= MOST_CAMERA_PIXELS
+            ):
+                return cls((width, height), asked.get("back") is True, str(asked.get("labels", "")))
+        most = MOST_CAMERA_PIXELS // 10**6
+        raise DesignError(f"camera: expected width and height, 10 px or more, and at most {most} megapixels")
 
 
 def start_document() -> dict[str, Any]:
@@ -108,13 +111,13 @@ def design_of(fields: object) -> Design:
     return Design(**fields)
 
 
-def design_document(fields: object, look: Look) -> dict[str, Any]:
-    """The drawing, labels, key figures and findings of a design, and its TOML.
+def design_document(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The drawing, labels, key figures and findings of the design of a request, and its TOML.
 
     Raises:
         DesignError: see ``design_of``; or a design without a layout.
     """
-    design = design_of(fields)
+    design, look = design_of(asked.get("fields")), Look.of(asked)
     layout = design.layout
     report = design_report(design, layout, look.camera_px)
     findings = [*report.findings, *clip_findings(layout, look.camera_px)]
@@ -152,13 +155,24 @@ def error_fields(text: str) -> list[str]:
     return list(_fields_in(text, in_palette=False))
 
 
-def remedy_of(fields: object, subject: str, look: Look) -> dict[str, Any]:
+def proposed_design(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The design that ``size`` proposes for a camera, and its figures.
+
+    Raises:
+        CmpDesignError: see ``size``.
+    """
+    from cmpdesign.proposal.camera_design import size
+
+    make, error = asked.get("make") or None, str(asked.get("error") or "") or None
+    proposal = size(str(asked.get("camera", "")), str(asked.get("view", "")), error, make=make)
+    return {"fields": fields_of(proposal.design), "figures": proposal.figures()}
+
+
+def remedy_of(asked: Mapping[str, Any]) -> dict[str, Any]:
     """A change of one field after which a finding is gone and no other finding has come; of a number the smallest.
 
     Args:
-        fields: the design.
-        subject: the finding's subject.
-        look: the camera of the check.
+        asked: the request: design, camera, and the finding's subject.
 
     Returns:
         Field, dotted -> new value; empty where no single field helps.
@@ -166,7 +180,7 @@ def remedy_of(fields: object, subject: str, look: Look) -> dict[str, Any]:
     Raises:
         DesignError: see ``design_of``.
     """
-    design = design_of(fields)
+    design, look, subject = design_of(asked.get("fields")), Look.of(asked), asked.get("subject")
     before = check_design(design, design.layout, look.camera_px)
     finding = next((each for each in before if each.subject == subject), None)
     if finding is None:

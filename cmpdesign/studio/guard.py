@@ -73,13 +73,14 @@ class Door:
 
     def refusal(self, scope: Any) -> str:
         """Why a request is not answered; "" if it may enter."""
-        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
-        host, origin = headers.get("host", ""), headers.get("origin")
+        pairs = [(name.decode("latin-1"), value.decode("latin-1")) for name, value in scope["headers"]]
+        headers = dict(pairs)
+        host, origins = headers.get("host", ""), [value for name, value in pairs if name == "origin"]
         if not self.is_own(host):
             return "this is not the name of the server; use the address that the program printed"
-        if origin is not None and origin != f"http://{host}":
+        if any(origin != f"http://{host}" for origin in origins):
             return "requests of other pages are refused"
-        if scope["type"] == "websocket" and origin is None:
+        if scope["type"] == "websocket" and not origins:
             return "a connection of no page is refused"
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
         given += _cookies(headers.get("cookie", ""), self.cookie)

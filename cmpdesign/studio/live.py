@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections import deque
 from dataclasses import dataclass, field
+from pathlib import Path
 from threading import Condition, Thread
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +16,12 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import decode_bytes, to_jpeg
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.studio.readings import in_8_bits
-from cmpdesign.tracking.live.view import LiveCount
+from cmpdesign.studio.recording import Recorder, Recordings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cmpdesign.tracking.live.view import LiveCount
     from cmpdesign.tracking.run import TrackingRun
     from extractor import Reference
     from extractor.contact import ContactForce
@@ -50,6 +53,7 @@ class LiveFeed:
         name: the source's name.
         layout: the pad.
         is_paced: the source is no camera.
+        recorder: records for the page; None: the run is in space, where only the command line records.
         failure: why the run ended early; "" else.
         is_over: the run has ended.
     """
@@ -57,6 +61,7 @@ class LiveFeed:
     name: str
     layout: Reference
     is_paced: bool
+    recorder: Recorder | None = None
     failure: str = ""
     is_over: bool = False
     address: str = ""
@@ -73,6 +78,8 @@ class LiveFeed:
             now_s = time.monotonic()
             self._began_s = self._began_s if np.isfinite(self._began_s) else now_s - frame.time_s
             time.sleep(min(max(0.0, self._began_s + frame.time_s - now_s), 1.0))
+        if self.recorder is not None:
+            self.recorder.add(frame)
         with self._changed:
             self._times.append(time.monotonic())
             count = 0 if self._latest is None else self._latest.count + 1
@@ -100,8 +107,17 @@ class LiveFeed:
 
     def count(self) -> LiveCount:
         """The counts so far."""
+        from cmpdesign.tracking.live.view import LiveCount
+
         shown = 0 if self._latest is None else self._latest.count + 1
         return LiveCount(shown, 0, False, self.failure)
+
+    def stop(self) -> None:
+        """End the run after its present frame, and forget a recording that was not saved."""
+        if self.run is not None:
+            self.run.stop.is_requested = True
+        if self.recorder is not None:
+            self.recorder.close()
 
     def close(self) -> LiveCount:
         """The run has ended; the last frame stays."""
@@ -110,7 +126,12 @@ class LiveFeed:
 
     def follow(self, run: TrackingRun) -> Thread:
         """Start the run in a thread; a failure is told to the page."""
+        from cmpdesign.tracking.table import TrackTable
+        from extractor import Tracker
+
         self.run, run.live = run, self  # type: ignore[assignment]
+        if isinstance(run.tracker, Tracker):
+            self.recorder = Recorder(lambda: TrackTable(run.tracker, lambda: run.source.times))
 
         def go() -> None:
             try:
@@ -143,14 +164,21 @@ class CameraReader:
     """Reads the frames that the browser's camera sends, one after the other."""
 
     def __init__(self, layout: Reference) -> None:
+        from cmpdesign.tracking.table import TrackTable
         from extractor import Tracker
 
         self._tracker = Tracker(layout, side="either")
+        self.recorder: Recorder | None = Recorder(lambda: TrackTable(self._tracker))
         self._times: deque[float] = deque(maxlen=_RATE_FRAMES)
 
     def reset_rest(self) -> None:
         """The next frame is the rest frame."""
         self._tracker.rest = None
+
+    def close(self) -> None:
+        """Forget a recording that was not saved."""
+        if self.recorder is not None:
+            self.recorder.close()
 
     def read(self, data: bytes) -> dict[str, Any]:
         """The document of one frame; a frame that cannot be decoded has a reason.
@@ -165,7 +193,44 @@ class CameraReader:
             problem = str(error)
         self._times.append(now_s)
         tracked = self._tracker.track(image, time_s=now_s, reason=problem)
+        if self.recorder is not None:
+            self.recorder.add(tracked)
         return frame_document(tracked, rate_of(self._times))
+
+
+def open_camera(layout: Reference, number: int) -> LiveFeed:
+    """Track a camera of this machine, until the feed is stopped.
+
+    Raises:
+        CmpDesignError: the camera cannot be opened.
+    """
+    from cmpdesign.api.sequences import track_job
+
+    with tempfile.TemporaryDirectory(prefix="cmpdesign-studio-") as folder:
+        run = track_job(layout, number, Path(folder) / "run.npz", side="either").prepare()
+        run.sink.close()
+    run.sink = NoSink()
+    feed = LiveFeed(run.source.name, layout, is_paced=not run.source.is_live)
+    feed.follow(run)
+    return feed
+
+
+def obey(source: LiveFeed | CameraReader, words: str, recordings: Recordings) -> dict[str, Any] | None:
+    """Do what the page says of a source: "rest", "record KIND" or "save"; the answer, if there is one."""
+    recorder = source.recorder
+    try:
+        if words == "rest":
+            source.reset_rest()
+        elif recorder is None:
+            raise CmpDesignError("this source is recorded by the command line: cmpdesign view ... -o run.npz")
+        elif words == "save":
+            return recorder.save(recordings)
+        elif words.startswith("record "):
+            recorder.start(words.removeprefix("record "))
+            return {"recording": True}
+    except CmpDesignError as error:
+        return {"note": str(error)}
+    return None
 
 
 def hello_document(layout: Reference, name: str) -> dict[str, Any]:

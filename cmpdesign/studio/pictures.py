@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from cmpdesign.files.images import to_png
@@ -12,7 +13,7 @@ BLUR_PX = 1.0
 _DECIMALS = 3  # of a path on the screen, mm
 
 
-def seen_picture(fields: object, look: Look) -> bytes:
+def seen_picture(asked: Mapping[str, Any]) -> bytes:
     """The pad as a camera sees it whose picture the pattern fills, as PNG.
 
     Raises:
@@ -21,13 +22,13 @@ def seen_picture(fields: object, look: Look) -> bytes:
     from cmpdesign.products.as_made.reading import filling_view
     from cmpdesign.scene import Camera, Optics, Scene, render
 
-    layout = design_of(fields).layout
+    layout, look = design_of(asked.get("fields")).layout, Look.of(asked)
     camera_turn_deg, scale = filling_view(layout, look.camera_px)
     camera = Camera(scale * float(layout.parameters["pitch_mm"]), camera_turn_deg)
     return to_png(render(Scene(layout, camera, optics=Optics(BLUR_PX)), size=look.camera_px).image)
 
 
-def laser_document(fields: object) -> dict[str, Any]:
+def laser_document(asked: Mapping[str, Any]) -> dict[str, Any]:
     """The passes of the laser job of a design in burning order: paths, times, and the cells as made.
 
     Places are in mm on a drawing with y down, from the top left of the job's extent. ``begin_s`` are the starts of the
@@ -45,7 +46,7 @@ def laser_document(fields: object) -> dict[str, Any]:
     from cmpdesign.products.laser.paths.timing import begin_times_s
     from cmpdesign.products.laser.setup import complete_setup
 
-    design = design_of(fields)
+    design = design_of(asked.get("fields"))
     job = make_job(design.name, design.layout, complete_setup(design.laser))
     machine, (left, _, _, top) = job.setup.machine, job.extent_mm
 

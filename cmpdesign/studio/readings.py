@@ -1,13 +1,15 @@
-"""Pictures that were dropped on the page: read, judged, and kept for their stages and the report of a problem."""
+"""Pictures that were dropped on the page: read, judged, compared, and kept for their stages and files."""
 
 from __future__ import annotations
 
 import secrets
 import shutil
 import tempfile
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,77 +17,112 @@ import numpy as np
 from cmpdesign.api.pictures import Verifier, verify
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.atomic import write_file
-from cmpdesign.files.images import IMAGE_BITS, to_jpeg
+from cmpdesign.files.images import IMAGE_BITS, ImageFileError, read_image, to_jpeg
+from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.files import read_file
+from cmpdesign.studio.recording import KINDS
+from extractor import Reference
+from extractor.layout.layout_file import parse_layout
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from extractor import Markers, Reference
+    from cmpdesign.api.designs import Design
+    from cmpdesign.products.laser.coupon.design import Coupon
+    from extractor import Markers
 
 MOST_PICTURE_BYTES = 64 << 20
 MOST_PIXELS = 60_000_000  # width x height, tested before a picture is decoded
-MOST_KEPT = 4
+MOST_KEPT = 40  # pictures, as files
+MOST_LAYOUTS = 8
 JPEG_QUALITY = 92
 _PICTURE = "picture"
 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One picture and its verdict.
+    """One picture and its verdict; pixels and stages are not kept, but read again where they are needed.
 
     Attributes:
         key: name of the reading for the page.
         name: the picture's own name.
         file: the picture's bytes, in a private folder.
         verifier: the reader and its layout.
-        image: (H, W, 3) BGR.
-        verdict: ``Verdict`` of a pattern, or ``SheetVerdict`` of a print sheet.
+        size_px: width and height.
+        verdict: ``Verdict`` of a pattern, ``SheetVerdict`` of a print sheet, ``CouponReading`` or ``GridReading``.
+        coupon: the coupon that the picture shows, if any.
     """
 
     key: str
     name: str
     file: Path
     verifier: Verifier
-    image: NDArray[Any]
+    size_px: tuple[int, int]
     verdict: Any
+    coupon: Coupon | None = None
+
+    @property
+    def markers(self) -> Markers | None:
+        """The markers of a picture of a pattern."""
+        return getattr(self.verdict, "markers", None)
 
     def document(self) -> dict[str, Any]:
-        """The verdict as in ``verify.json``, and the markers for the overlay."""
-        from cmpdesign.reading.verify import Verdict
-
-        height, width = self.image.shape[:2]
-        found = {"key": self.key, "name": self.name, "size_px": [width, height], **self.verdict.to_json()}
-        if not isinstance(self.verdict, Verdict):
+        """The verdict as in the document of ``verify`` or ``kerf``, and the markers for the overlay."""
+        about = {"key": self.key, "name": self.name, "size_px": self.size_px}
+        if self.coupon is not None:
+            if self.coupon.kind == "grid":
+                return {**about, "grid": self.verdict.to_json(), "material": self.coupon.material}
+            return {**about, "kerf": self.verdict.to_json(self.coupon), "material": self.coupon.material}
+        found = {**about, **self.verdict.to_json()}
+        if self.markers is None:
             return {**found, "line": self.verdict.line()}
-        markers, reference = self.verdict.markers, self.verifier.reference
-        return {
-            **found,
-            **markers_document(markers, reference),
-            "advice": markers.advice,
-            "stages": list(self.stages),
-        }
+        markers = markers_document(self.markers, self.verifier.reference)
+        return {**found, **markers, "advice": self.markers.advice}
 
-    @cached_property
-    def stages(self) -> dict[str, NDArray[np.uint8]]:
-        """Stage -> picture of its result."""
-        from cmpdesign.reading.verify import Verdict
-        from extractor.draw import draw_stages
+    def moved(self, rest: Reading | None) -> dict[str, Any]:
+        """Displacements from another picture, or without one from the flat pattern that fits best.
 
-        if not isinstance(self.verdict, Verdict):
-            return {}
-        return draw_stages(self.image, self.verifier.reference, self.verdict.markers)
-
-    def picture(self, stage: str) -> bytes:
-        """The picture, or one of its stages, as a JPEG.
+        Rows are those of ``document``; null where a displacement is unknown. ``sigma_px`` is its larger deviation by
+        both pictures' covariances.
 
         Raises:
-            CmpDesignError: no such stage.
+            CmpDesignError: the pictures cannot be compared.
         """
-        if stage != _PICTURE and stage not in self.stages:
-            raise CmpDesignError(f"{stage[:40]}: this picture has no such stage")
-        pixels = self.image if stage == _PICTURE else self.stages[stage]
-        return to_jpeg(in_8_bits(pixels), JPEG_QUALITY)
+        from extractor.numeric.homographies import mapped
+        from extractor.track.displacement import fit_rest
+
+        reference = self.verifier.reference
+        if self.markers is None or (rest is not None and rest.markers is None):
+            raise CmpDesignError(
+                "only pictures of patterns have displacements; choose another picture as rest"
+            )
+        cov = self.markers.cov_px2
+        if rest is None:
+            plane = fit_rest(self.markers.xy_px, reference).layout_from_image
+            if plane is None:
+                raise CmpDesignError("fewer than 4 markers are found: no flat pattern can be fitted")
+            base_px = mapped(np.linalg.inv(plane).astype(np.float64), reference.xy_mm)
+        else:
+            assert rest.markers is not None
+            if rest.verifier.reference.digest != reference.digest or rest.size_px != self.size_px:
+                raise CmpDesignError(
+                    f"{rest.name} and {self.name} differ in layout or size; read both with one layout and camera"
+                )
+            base_px, cov = rest.markers.xy_px, cov + rest.markers.cov_px2
+        found = found_markers(self.markers)
+        px = (self.markers.xy_px - base_px)[found]
+        mm = fit_rest(base_px, reference).displacement_mm(self.markers.xy_px)[found]
+        sigma_px = np.sqrt(np.linalg.eigvalsh(np.nan_to_num(cov[found]))[:, 1])
+        known = np.isfinite(mm).all(axis=1)
+        length_mm = np.linalg.norm(mm[known], axis=1)
+        return {
+            "from": None if rest is None else rest.name,
+            "px": _rows(px, 3),
+            "mm": _rows(mm, 5),
+            "sigma_px": sigma_px.round(4).tolist(),
+            "largest_mm": round(float(length_mm.max()), 5) if known.any() else None,
+            "rms_mm": round(float(np.sqrt(np.mean(length_mm**2))), 5) if known.any() else None,
+        }
 
     def report(self) -> bytes:
         """The bundle of a problem, as of ``verify --report``."""
@@ -95,36 +132,97 @@ class Reading:
 
 
 class Readings:
-    """The last readings of this run of the page."""
+    """The last pictures and layouts of this run of the page."""
 
     def __init__(self) -> None:
         self._readings: dict[str, Reading] = {}
-        self._verifiers: dict[str, Verifier] = {}
+        self._verifier: Verifier | None = None
+        self._layouts: dict[str, Reference | Coupon] = {}
+        self._stages: tuple[str, Mapping[str, NDArray[np.uint8]]] = ("", {})  # of one picture, by its key
+        self._drawing = Lock()
 
-    def read(self, reference: Reference, name: str, data: bytes) -> Reading:
-        """Read a picture.
+    def add_layout(self, text: str) -> dict[str, Any]:
+        """Keep a layout file, or a coupon.json or grid.json, to read pictures with.
+
+        Raises:
+            CmpDesignError, LayoutError: the text is neither.
+        """
+        from cmpdesign.products.laser.coupon.design import parse_coupon
+
+        document = parse_json(text, "the layout")
+        key = secrets.token_hex(8)
+        if isinstance(document, dict) and document.get("format") == "cmp-coupon":
+            coupon = parse_coupon(document, "the coupon")
+            self._layouts[key], about = coupon, f"{coupon.kind} coupon, {coupon.material}"
+        else:
+            layout = parse_layout(text)
+            self._layouts[key] = layout
+            about = f"{layout.pattern}, {int(layout.present.sum())} markers"
+        for old in list(self._layouts)[:-MOST_LAYOUTS]:
+            del self._layouts[old]
+        return {"key": key, "about": about}
+
+    def layout(self, design: Design, key: str) -> Reference:
+        """The layout of a key; of the design where the key is empty, or names a coupon.
+
+        Raises:
+            CmpDesignError: no such layout.
+        """
+        if key and key not in self._layouts:
+            raise CmpDesignError("this layout is gone; open it again")
+        kept = self._layouts.get(key)
+        return kept if isinstance(kept, Reference) else design.layout.reference()
+
+    def read(self, design: Design, layout: str, name: str, data: bytes) -> dict[str, Any]:
+        """Read a picture: of a pattern, of a print sheet, or of a coupon of the design's laser job.
+
+        The document of a picture of a pattern also has the names of the stages that were reached.
+
+        Args:
+            design: the open design.
+            layout: key of a layout or a coupon; "": that of the design.
+            name: the picture's name.
+            data: bytes of the file.
 
         Raises:
             ImageFileError: no color picture, or a picture of too many pixels.
         """
+        reference = self.layout(design, layout)
         folder = Path(tempfile.mkdtemp(prefix="cmpdesign-studio-"))
         suffix = Path(name).suffix.lower()
         file = folder / f"{_PICTURE}{suffix if suffix in IMAGE_BITS else ''}"
         try:
             write_file(file, data)
-            verifier = self._verifier(reference)
-            image = verifier.read(file)
-            verdict = verifier.judge(image, file)
+            reading = self._judged(reference, partial(self._coupons, design, layout), name, file)
         except BaseException as error:
             shutil.rmtree(folder, ignore_errors=True)
             if isinstance(error, CmpDesignError):
                 raise CmpDesignError(str(error).replace(str(file), name)) from None
             raise
-        reading = Reading(secrets.token_hex(8), name, file, verifier, image, verdict)
+        document = {**reading.document(), "stages": [*self._draw(reading)]}
+        if reading.markers is not None:
+            bare = replace(reading.markers, stages={})
+            reading = replace(reading, verdict=replace(reading.verdict, markers=bare))
         self._readings[reading.key] = reading
         for old in list(self._readings.values())[:-MOST_KEPT]:
             self._forget(old)
-        return reading
+        return document
+
+    def picture(self, key: str, stage: str) -> bytes:
+        """A picture, or one of its stages, as a JPEG.
+
+        Raises:
+            CmpDesignError: no such reading, or no such stage.
+        """
+        reading = self.get(key)
+        if stage == _PICTURE:
+            pixels: NDArray[Any] | None = read_image(reading.file, MOST_PIXELS, gray=True)
+        else:
+            with self._drawing:
+                pixels = (self._stages[1] if self._stages[0] == key else self._draw(reading)).get(stage)
+        if pixels is None:
+            raise CmpDesignError(f"{stage[:40]}: this picture has no such stage")
+        return to_jpeg(in_8_bits(pixels), JPEG_QUALITY)
 
     def get(self, key: str) -> Reading:
         """A reading by its key.
@@ -136,34 +234,107 @@ class Readings:
             raise CmpDesignError("this picture is gone; drop it again")
         return self._readings[key]
 
+    def track(self, keys: Sequence[str], rest: str | None, kind: str) -> bytes:
+        """The table or recording that ``track`` writes of pictures in their order.
+
+        Args:
+            keys: the pictures.
+            rest: the picture at rest; None: the first.
+            kind: one of ``KINDS``.
+
+        Raises:
+            CmpDesignError: no picture, pictures of several layouts, or an unknown kind.
+        """
+        from cmpdesign.api.sequences import track
+
+        read = [self.get(key) for key in keys[: MOST_KEPT + 1]]
+        if kind not in KINDS:
+            raise CmpDesignError(f"{kind[:20]}: expected one of {', '.join(KINDS)}")
+        if not 0 < len(read) <= MOST_KEPT or len({one.verifier.reference.digest for one in read}) > 1:
+            raise CmpDesignError(f"choose 1 to {MOST_KEPT} pictures that were read with one layout")
+        with tempfile.TemporaryDirectory(prefix="cmpdesign-studio-") as folder:
+            frames = Path(folder) / "frames"
+            frames.mkdir()
+            for number, one in enumerate(read):
+                shutil.copyfile(one.file, frames / f"{number:04d}{one.file.suffix or '.png'}")
+            made = Path(folder) / f"run.{kind}"
+            at_rest = None if rest is None else self.get(rest).file
+            track(
+                read[0].verifier.reference, frames, made, rest=at_rest, side="either", max_pixels=MOST_PIXELS
+            )
+            return read_file(made)
+
     def close(self) -> None:
         """Remove all pictures."""
         for reading in list(self._readings.values()):
             self._forget(reading)
 
+    def _coupons(self, design: Design, layout: str) -> list[Coupon]:
+        """The coupon of a key; else those of the design's laser job."""
+        from cmpdesign.studio.coupons import coupons_of
+
+        given = self._layouts.get(layout)
+        return coupons_of(design) if given is None or isinstance(given, Reference) else [given]
+
+    def _judged(
+        self, reference: Reference, coupons: Callable[[], list[Coupon]], name: str, file: Path
+    ) -> Reading:
+        """The reading of a file; a picture without a marker may show a coupon."""
+        if self._verifier is None or self._verifier.reference.digest != reference.digest:
+            self._verifier = Verifier(reference, max_pixels=MOST_PIXELS)
+        verifier, problem, verdict, size_px = self._verifier, None, None, (0, 0)
+        try:
+            image = verifier.read(file)
+            size_px, verdict = (image.shape[1], image.shape[0]), verifier.judge(image, file)
+        except ImageFileError as error:  # a scan of a coupon may be gray
+            problem = error
+        key = secrets.token_hex(8)
+        markers = getattr(verdict, "markers", None)
+        from cmpdesign.studio.coupons import coupon_readings
+
+        if verdict is None or (markers is not None and not markers.found):
+            for coupon, found, shown_px in coupon_readings(coupons(), file, MOST_PIXELS):
+                return Reading(key, name, file, verifier, shown_px, found, coupon)
+        if problem is not None:
+            raise problem
+        return Reading(key, name, file, verifier, size_px, verdict)
+
+    def _draw(self, reading: Reading) -> Mapping[str, NDArray[np.uint8]]:
+        """Stage -> picture of its result; kept until another picture's are drawn."""
+        from extractor.draw import draw_stages
+
+        if reading.markers is None:
+            return {}
+        verifier, markers = reading.verifier, reading.markers
+        image = verifier.read(reading.file)
+        markers = markers if markers.stages else verifier.extractor.extract(image)
+        self._stages = (reading.key, draw_stages(image, verifier.reference, markers))
+        return self._stages[1]
+
     def _forget(self, reading: Reading) -> None:
         self._readings.pop(reading.key, None)
         shutil.rmtree(reading.file.parent, ignore_errors=True)
 
-    def _verifier(self, reference: Reference) -> Verifier:
-        """The reader of a layout; a reader is kept for the next picture of the same layout."""
-        if reference.digest not in self._verifiers:
-            self._verifiers = {reference.digest: Verifier(reference, max_pixels=MOST_PIXELS)}
-        return self._verifiers[reference.digest]
+
+def found_markers(markers: Markers) -> NDArray[np.intp]:
+    """The ids of the markers that have a place."""
+    return np.flatnonzero(np.isfinite(markers.xy_px[:, 0]))
 
 
 def markers_document(markers: Markers, reference: Reference) -> dict[str, Any]:
     """The found markers: id, place and deviation in px, status, and the gridlines between found markers."""
-    found = np.flatnonzero(np.isfinite(markers.xy_px[:, 0]))
+    found = found_markers(markers)
     row = np.full(len(markers.xy_px), -1)
     row[found] = np.arange(len(found))
     edges = row[reference.edges]
-    cov = markers.cov_px2[found]
+    refined = markers.stages.get("refine")
     return {
         "ids": found.tolist(),
         "xy": markers.xy_px[found].round(3).tolist(),
-        "cov": np.nan_to_num(cov)[:, [0, 0, 1], [0, 1, 1]].tolist(),
+        "xy_mm": reference.xy_mm[found].round(5).tolist(),
+        "cov": np.nan_to_num(markers.cov_px2[found])[:, [0, 0, 1], [0, 1, 1]].tolist(),
         "status": markers.status[found].tolist(),
+        "explained": None if refined is None else refined.explained[found].tolist(),
         "edges": edges[(edges >= 0).all(axis=1)].tolist(),
         "layer": reference.layer[found].tolist(),
         "index": reference.index[found].tolist(),
@@ -173,3 +344,11 @@ def markers_document(markers: Markers, reference: Reference) -> dict[str, Any]:
 def in_8_bits(pixels: NDArray[Any]) -> NDArray[np.uint8]:
     """A picture of 8 or 16 bits with 8 bits."""
     return pixels if pixels.dtype == np.uint8 else (pixels >> 8).astype(np.uint8)
+
+
+def _rows(values: NDArray[Any], digits: int) -> list[list[float] | None]:
+    """Rows for JSON; None for a row with a NaN."""
+    known = np.isfinite(values).all(axis=1).tolist()
+    return [
+        row if is_known else None for row, is_known in zip(values.round(digits).tolist(), known, strict=True)
+    ]

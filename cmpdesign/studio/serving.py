@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 HOST, PORT = "127.0.0.1", 8300
 MOST_MESSAGE_BYTES = 8 << 20  # of a websocket: one frame of a camera
+MOST_CONNECTIONS = 64  # requests and websockets at once; a browser opens 6 requests a tab
 BROWSER_S = 0.3  # from the start to the browser's first request
 
 
@@ -56,6 +57,7 @@ def serve(
         access_log=False,
         server_header=False,
         ws_max_size=MOST_MESSAGE_BYTES,
+        limit_concurrency=MOST_CONNECTIONS,
         timeout_graceful_shutdown=3,
     )
     announce(door.address)

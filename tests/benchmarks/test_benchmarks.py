@@ -35,6 +35,7 @@ ROOT = Path(__file__).parents[2]
     ("name", "keys"),
     [
         ("startup", set()),
+        ("interrupts", set()),
         ("rendering", set()),
         ("contact", set()),
         ("latency", {"seconds"}),
@@ -59,6 +60,7 @@ def test_a_quick_run_prints_and_writes(name: str, keys: set[str], tmp_path: Path
         assert abs(short["true constants"]) < 1 < 15 < short["no medium"] < 35
 
 
+@pytest.mark.slow
 def test_the_benchmark_of_molds_runs(tmp_path: Path) -> None:
     out = tmp_path / "figures.json"
     command = [sys.executable, "-m", "benchmarks.molds", "--quick", "--json", str(out)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -44,9 +45,14 @@ def test_the_address_stands_in_one_place() -> None:
 
 
 def test_the_source_archive_can_make_the_page(tmp_path: Path) -> None:
-    code = f"from scikit_build_core.build import build_sdist; build_sdist({str(tmp_path)!r})"
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=True)
-    (path,) = tmp_path.iterdir()
+    """From a copy without what is installed and made, which the builder would walk through."""
+    made = shutil.ignore_patterns(
+        ".venv", ".git", "build", "dist", "out", "__pycache__", "docs", "benchmarks"
+    )
+    shutil.copytree(ROOT, tmp_path / "copy", ignore=made)
+    code = "from scikit_build_core.build import build_sdist; build_sdist('..')"
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path / "copy", capture_output=True, check=True)
+    (path,) = tmp_path.glob("*.tar.gz")
     with tarfile.open(path) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
         described = archive.extractfile(f"{path.name.removesuffix('.tar.gz')}/PKG-INFO")

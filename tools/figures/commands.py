@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import typer
@@ -100,9 +101,14 @@ def _argument_row(parameter: Any) -> tuple[str, str]:
 
 def _option_row(parameter: Any) -> tuple[str, str]:
     """The names with their value, and the help text with range and default, as the help of the program shows them."""
-    context = typer.Context(get_command(app))
-    names, words = parameter.get_help_record(context)
+    names, words = parameter.get_help_record(_context())
     return f"`{names.replace('|', chr(92) + '|')}`", _escaped(words.replace("  [", " ["))
+
+
+@cache
+def _context() -> typer.Context:
+    """Of all commands, which Typer makes anew for every call."""
+    return typer.Context(get_command(app))
 
 
 def _table(heading: str, rows: list[tuple[str, str]]) -> str:

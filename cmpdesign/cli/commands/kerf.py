@@ -16,7 +16,7 @@ from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.design import Coupon
-    from cmpdesign.products.laser.coupon.photo import CouponReading, MeasuredWidth, PatchKerf
+    from cmpdesign.products.laser.coupon.photo import CouponReading, PatchKerf
     from cmpdesign.products.laser.grid.reading import FieldReading, GridReading
 
 EXAMPLES = ("cmpdesign kerf coupon.json scan.png", "cmpdesign kerf grid.json photo.jpg --json")
@@ -73,7 +73,7 @@ def kerf(
     say(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
     for patch_kerf in reading.patches:
         say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
-    finish(lambda: KerfDocument.model_validate(_reading_to_json(cut_coupon, reading)))
+    finish(lambda: KerfDocument.model_validate(reading.to_json(cut_coupon)))
 
 
 def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
@@ -87,7 +87,7 @@ def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
     for heading in ("field", "power", "speed", *(f"{count} x" for count in counts), "depth a pass"):
         table.add_column(heading, justify="left" if heading == "field" else "right")
     for one in reading.fields:
-        windows = [one.states[count] for count in counts]
+        windows = [_window_text(one, count) for count in counts]
         settings = (f"{one.power_percent:g} %", f"{one.speed_mm_s:g} mm/s")
         table.add_row(one.name, *settings, *windows, _depth_text(one.depth_per_pass_mm))
     say(table)
@@ -98,14 +98,21 @@ def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
             f"\nfor the file of {grid.material}, the settings of {grid.machine}: the quickest with a pass in reserve"
         )
         say(_settings_lines(reading.best, photo.name), soft_wrap=True)
-    finish(lambda: GridDocument.model_validate(_grid_to_json(reading)))
+    finish(lambda: GridDocument.model_validate(reading.to_json()))
 
 
-def _depth_text(depth: tuple[float, float] | None) -> str:
-    if depth is None:
-        return "not through"
+def _window_text(one: FieldReading, count: int) -> str:
+    if one.states[count] != "marked":
+        return one.states[count]
+    low, high = one.depths_mm[count]
+    return f"{low:.2g} to {high:.2g} mm" if low else f"to {high:.2g} mm"
+
+
+def _depth_text(depth: tuple[float, float]) -> str:
     low, high = depth
-    return f"above {low:.3g} mm" if high == float("inf") else f"{low:.3g} to {high:.3g} mm"
+    if high == float("inf"):
+        return f"above {low:.3g} mm"
+    return f"{low:.3g} to {high:.3g} mm" if low else f"below {high:.3g} mm"
 
 
 def _settings_lines(one: FieldReading, photo: str) -> str:
@@ -119,29 +126,6 @@ def _settings_lines(one: FieldReading, photo: str) -> str:
         "cut_passes": str(reserve),
     }
     return "\n".join(f"{name} = {{ value = {value}, source = {source} }}" for name, value in values.items())
-
-
-def _grid_to_json(reading: GridReading) -> dict[str, object]:
-    fields = []
-    for one in reading.fields:
-        low, high = one.depth_per_pass_mm or (None, None)
-        fields.append(
-            {
-                "name": one.name,
-                "power_percent": one.power_percent,
-                "speed_mm_s": one.speed_mm_s,
-                "windows": one.states,
-                "passes": one.passes,
-                "least_depth_per_pass_mm": low,
-                "most_depth_per_pass_mm": None if high == float("inf") else high,
-            }
-        )
-    return {
-        "scale_px_mm": round(reading.scale_px_mm, 4),
-        "from_back": reading.from_back,
-        "best": None if reading.best is None else reading.best.name,
-        "fields": fields,
-    }
 
 
 def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
@@ -185,38 +169,3 @@ def _material_file_lines(reading: CouponReading, patch_kerf: PatchKerf, photo: s
         source = json.dumps(text, ensure_ascii=False)
         lines.append(f"kerf_{axis}_mm = {{ value = {front.value_mm:.4f}, source = {source} }}")
     return "\n".join(lines)
-
-
-def _reading_to_json(coupon: Coupon, reading: CouponReading) -> dict[str, object]:
-    return {
-        "format": "cmp-kerf",
-        "version": 2,
-        "from_back": reading.from_back,
-        "face": reading.face,
-        "taper_deg": coupon.taper_deg,
-        "taper_assumed": coupon.taper_assumed,
-        "thickness_mm": coupon.thickness_mm,
-        "response": reading.response,
-        "scale_px_mm": round(reading.scale_px_mm, 4),
-        "fit_mm": round(reading.fit_mm, 6),
-        "patches": [
-            {
-                "name": one.patch.name,
-                "power_percent": one.patch.power_percent,
-                "speed_mm_s": one.patch.speed_mm_s,
-                "passes": one.patch.passes,
-                **_axis_to_json("x", reading, one.x),
-                **_axis_to_json("y", reading, one.y),
-            }
-            for one in reading.patches
-        ],
-    }
-
-
-def _axis_to_json(axis: str, reading: CouponReading, seen: MeasuredWidth) -> dict[str, float]:
-    """Kerfs at the front (as in a material's file) and at the back, and their deviation."""
-    return {
-        f"kerf_{axis}_mm": round(reading.at_face("front", seen).value_mm, 5),
-        f"kerf_{axis}_back_mm": round(reading.at_face("back", seen).value_mm, 5),
-        f"kerf_{axis}_sigma_mm": round(seen.sigma_mm, 5),
-    }

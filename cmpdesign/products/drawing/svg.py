@@ -83,14 +83,15 @@ def layout_to_compact_svg(layout: Layout, *, mirror: bool = False) -> str:
     """
     width, height = layout.size_mm
     to_sheet = sheet_from_layout(layout, mirror)
-    xy = to_sheet(layout.marker_xy_mm)
-    rings = {COLORS[BLACK]: [to_sheet(layout.outline_mm).tolist()]}
+    places = [f"{x!r} {y!r}" for x, y in to_sheet(layout.marker_xy_mm).tolist()]
+    data = {COLORS[BLACK]: _closed_path(to_sheet(layout.outline_mm).tolist())}
     for color, name in enumerate(COLORS):
         if color != BLACK:
-            rings[name] = xy[layout.cell_corners[layout.cell_color == color]].tolist()
+            cells = layout.cell_corners[layout.cell_color == color].tolist()
+            data[name] = "".join(f"M{'L'.join([places[marker] for marker in cell])}Z" for cell in cells)
     paths = "".join(
-        f'<path class="{name}" fill="{layout.palette[name]}" d="{"".join(map(_closed_path, of_color))}"/>'
-        for name, of_color in rings.items()
+        f'<path class="{name}" fill="{layout.palette[name]}" d="{of_color}"/>'
+        for name, of_color in data.items()
     )
     return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width!r} {height!r}">{paths}</svg>\n'
 

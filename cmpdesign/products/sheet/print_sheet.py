@@ -10,7 +10,7 @@ from cmpdesign.design.sheet_options import SheetOptions, page_size_mm
 from cmpdesign.errors import DesignError
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.measures import cell_widths_mm
-from cmpdesign.layout.outline import corner_offsets
+from cmpdesign.layout.outline import Points
 from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.as_made.made_pad import Cause, MadePad, make_pad
@@ -42,7 +42,6 @@ MARGIN_MM, KEY_LEFT_MM, KEY_BOTTOM_MM = 10.0, 10.0, 32.0
 PATCH_MM, FRAME_MM = 6.0, 0.2
 PATCH_STEP_MM = 9.0, 14.0  # from patch to patch: smallest, for the text below, and usual
 TEXT_MM = 2.6
-Points = NDArray[np.float64]
 
 
 def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
@@ -67,7 +66,7 @@ def make_print_sheet(design: Design, layout: Layout) -> ProductFiles:
 
 
 def made_pad(design: Design, layout: Layout) -> MadePad:
-    """The pad as printed: the black ground spreads into every cell.
+    """The pad as printed: the black ground spreads into every cell, but not where two cells touch.
 
     Raises:
         DesignError: nothing of a cell stays.
@@ -79,8 +78,23 @@ def made_pad(design: Design, layout: Layout) -> MadePad:
             f"sheet.dot_gain_mm = {gain_mm:g}: the ink closes cells, whose smallest inner radius is {free_mm:.3g} mm; "
             "make pitch_mm larger"
         )
-    cells = [ring - gain_mm * corner_offsets(ring) for ring in layout.colored_outlines_mm]
+    corners = layout.cell_corners[layout.colored_cells]
+    sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1), axis=-1)
+    _, place, cells_beside = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
+    gains = np.where(cells_beside[place.ravel()] == 1, gain_mm, 0.0).reshape(corners.shape)
+    cells = [_moved_inward(ring, gain) for ring, gain in zip(layout.colored_outlines_mm, gains, strict=True)]
     return make_pad(layout, "print", cells, (Cause("sheet.dot_gain_mm", gain_mm),))
+
+
+def _moved_inward(ring: Points, gains_mm: NDArray[np.float64]) -> Points:
+    """(K, 2) corners whose sides, each from its corner to the next one, moved inward by (K,) lengths."""
+    side = np.roll(ring, -1, axis=0) - ring
+    inward = np.stack([-side[:, 1], side[:, 0]], axis=-1) / np.hypot(*side.T)[:, None]
+    lines = np.stack([np.roll(inward, 1, axis=0), inward], axis=1)
+    moved: Points = (
+        ring + np.linalg.solve(lines, np.stack([np.roll(gains_mm, 1), gains_mm], axis=1)[..., None])[..., 0]
+    )
+    return moved
 
 
 def make_print_page(design: Design, layout: Layout) -> tuple[Page, int]:

@@ -63,6 +63,20 @@ export function save(name, data, type = "text/plain") {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
+// A dialog with a text that is pasted or opened; "take" may refuse it in words.
+export function openText(title, about, accept, value, take) {
+  const text = h("textarea", { rows: 18, "aria-label": title, spellcheck: "false", ".value": value });
+  const problem = h("p", { class: "finding error", hidden: true, role: "alert" });
+  const file = h("input", { type: "file", accept, "aria-label": "Open a file", onchange: async () => { text.value = await file.files[0].text(); } });
+  const use = async () => {
+    try { await take(text.value); dialog.close(); } catch (error) { problem.hidden = false; problem.textContent = error.message; }
+  };
+  const dialog = h("dialog", { "aria-label": title, onclose: () => dialog.remove() }, h("h2", {}, title), h("p", { class: "soft" }, about), file, text, problem,
+    h("div", { class: "row" }, h("span", { class: "grow" }), h("button", { onclick: () => dialog.close() }, "Close"), h("button", { class: "primary", onclick: use }, "Take over")));
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
 export const number = (value, digits = 4) => (value === null || value === undefined ? "–" : String(Number(Number(value).toPrecision(digits))));
 export const bytes = (count) => (count < 1e6 ? `${Math.ceil(count / 1e3)} kB` : `${(count / 1e6).toFixed(1)} MB`);
 export const words = (name) => name.replace(/_(mm_s|mm|deg|percent)$/, "").replaceAll("_", " ");

@@ -1,6 +1,6 @@
 // The part "Design": the form, the drawing that follows it, the findings with their remedies, the design's TOML.
 
-import { ask, figures, h, number, save, toast, told } from "./base.js";
+import { ask, figures, h, number, openText, save, toast, told } from "./base.js";
 import { DesignForm } from "./form.js";
 import { Stage } from "./stage.js";
 import { design } from "./state.js";
@@ -104,16 +104,8 @@ export class DesignPart {
   }
 
   #editToml() {
-    const text = h("textarea", { rows: 18, "aria-label": "The design as TOML", spellcheck: "false", ".value": this.toml ?? "" });
-    const problem = h("p", { class: "finding error", hidden: true, role: "alert" });
-    const file = h("input", { type: "file", accept: ".toml", "aria-label": "Open a TOML file", onchange: async () => { text.value = await file.files[0].text(); } });
-    const take = async () => {
-      try { design.open((await ask("/api/toml", { body: text.value })).fields); dialog.close(); } catch (error) { problem.hidden = false; problem.textContent = error.message; }
-    };
-    const dialog = h("dialog", { "aria-label": "TOML", onclose: () => dialog.remove() }, h("h2", {}, "The design as TOML"), h("p", { class: "soft" }, "Paste or open a design file; cmpdesign build takes the same text."), file, text, problem,
-      h("div", { class: "row" }, h("span", { class: "grow" }), h("button", { onclick: () => dialog.close() }, "Close"), h("button", { class: "primary", onclick: take }, "Take over")));
-    document.body.append(dialog);
-    dialog.showModal();
+    openText("The design as TOML", "Paste or open a design file; cmpdesign build takes the same text.", ".toml", this.toml ?? "",
+      async (text) => design.open((await ask("/api/toml", { body: text })).fields));
   }
 }
 

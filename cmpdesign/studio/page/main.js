@@ -25,7 +25,7 @@ function refreshTools() {
 function show(start) {
   const name = /^#\/(\w+)/.exec(location.hash)?.[1], part = name in PARTS ? name : "start";
   made[part] ??= new PARTS[part][1](start);
-  content.replaceChildren(made[part].element);
+  content.replaceChildren(h("h1", { class: "skip" }, PARTS[part][0]), made[part].element);
   for (const link of tabs.children) link.dataset.part === part ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
   document.title = `${PARTS[part][0]} · cmpdesign studio`;
   made[part].shown?.();

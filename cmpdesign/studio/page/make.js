@@ -21,7 +21,7 @@ export class MakePart {
     this.element = h("div", { class: "work two" },
       h("aside", { class: "side", "aria-label": "Products" }, h("div", { class: "box" }, h("h2", {}, "Products"), this.boxes, this.problem, h("button", { class: "primary", onclick: () => this.#build() }, "Build")), this.jobs),
       h("section", { class: "stage", "aria-label": "Pictures of the products" }, this.stageBar, h("div", { class: "canvas" }, this.view)));
-    this.pictures = new Map([["Camera view", () => this.#seen()], ["Laser paths", () => this.#laser()]]);
+    this.pictures = new Map([["Camera view", (isWanted) => this.#seen(isWanted)], ["Laser paths", () => this.#laser()]]);
     this.current = "Camera view";
   }
 
@@ -35,13 +35,14 @@ export class MakePart {
     this.current = this.pictures.has(name) ? name : this.pictures.keys().next().value;
     this.model?.dispose();
     this.model = null;
-    return told(async () => this.pictures.get(this.current)());
+    const turn = this.turn = {};
+    return told(async () => this.pictures.get(this.current)(() => turn === this.turn)); // not shown when another was chosen
   }
 
-  async #seen() {
+  async #seen(isWanted) {
     try {
       const picture = await ask("/api/seen", { body: { fields: design.fields, camera: design.camera }, as: "blob" });
-      this.#image(URL.createObjectURL(picture), `The pad as a camera of ${design.camera.join(" x ")} px sees it`);
+      if (isWanted()) this.#image(URL.createObjectURL(picture), `The pad as a camera of ${design.camera.join(" x ")} px sees it`);
     } catch (error) { this.view.replaceChildren(h("p", { class: "finding error", role: "alert" }, error.message)); }
   }
 
@@ -104,9 +105,10 @@ export class MakePart {
     add("Laser, as made", "laser/as-made.svg");
     add("Print sheet", "print/sheet.svg");
     for (const [title, name] of [["Mold in 3-D", "mesh/mold.glb"], ["Pad in 3-D", "mesh/pad.glb"]]) {
-      if (names.includes(name)) this.pictures.set(title, async () => {
-        const { Model } = await import("./model.js");
-        this.model = new Model(await ask(place(name), { as: "arrayBuffer" }), title);
+      if (names.includes(name)) this.pictures.set(title, async (isWanted) => {
+        const [{ Model }, data] = await Promise.all([import("./model.js"), ask(place(name), { as: "arrayBuffer" })]);
+        if (!isWanted()) return;
+        this.model = new Model(data, title);
         this.view.replaceChildren(...this.model.elements);
       });
     }

@@ -31,19 +31,28 @@ export class Model {
     const box = new three.Box3().setFromObject(group), size = box.getSize(new three.Vector3()), middle = box.getCenter(new three.Vector3());
     const radius = size.length() / 2;
     this.camera.near = radius / 100;
-    this.camera.far = radius * 30;
-    this.camera.position.copy(middle).add(new three.Vector3(0.7, 0.8, 1).setLength(radius * 3.1));
+    this.camera.far = radius * 100;
+    this.camera.position.copy(middle).add(new three.Vector3(0.7, 0.8, 1));
     this.controls.target.copy(middle);
+    this.#fit(group);
     const heights = this.parts.map((part) => new three.Box3().setFromObject(part).getCenter(new three.Vector3()).y);
     const order = [...heights.keys()].sort((one, other) => heights[one] - heights[other]);
     for (const part of this.parts) { part.material.clippingPlanes = [this.plane]; part.material.side = three.DoubleSide; }
     const slider = (name, value, act) => h("label", {}, name, h("input", { type: "range", min: 0, max: 1, step: 0.01, value, oninput: (event) => { act(Number(event.target.value)); this.draw(); } }));
-    const explode = (share) => order.forEach((part, rank) => { this.parts[part].position.y = share * rank * Math.max(size.y, radius / 6) * 0.6; });
+    const explode = (share) => { order.forEach((part, rank) => { this.parts[part].position.y = share * rank * Math.max(size.y, radius / 6) * 0.6; }); this.#fit(group); };
     const cut = (share) => { this.plane.constant = box.min.z + (1 - share) * (box.max.z - box.min.z) * 1.001; };
     cut(0);
     this.list.replaceChildren(slider("Apart", 0, explode), slider("Cut", 0, cut), ...this.parts.map((part) =>
       h("label", {}, h("input", { type: "checkbox", ".checked": true, onchange: (event) => { part.visible = event.target.checked; this.draw(); } }), part.name)));
     this.draw();
+  }
+
+  // All parts are in view, from the present direction.
+  #fit(group) {
+    const box = new three.Box3().setFromObject(group), middle = box.getCenter(new three.Vector3()), radius = box.getSize(new three.Vector3()).length() / 2;
+    const direction = this.camera.position.clone().sub(this.controls.target).setLength(radius * 3.1);
+    this.controls.target.copy(middle);
+    this.camera.position.copy(middle).add(direction);
   }
 
   draw() {

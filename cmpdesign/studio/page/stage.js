@@ -8,11 +8,12 @@ export class Stage {
     this.svg = h("svg", { role: "img", tabindex: 0, "aria-label": `${label}; drag or arrow keys move it, wheel or + and - zoom, 0 fits` });
     this.element = h("div", { class: "canvas" }, this.svg);
     this.box = this.view = [0, 0, 1, 1];
-    this.onview = () => {};
+    this.onview = this.onpick = () => {}; // onpick: a click that moved nothing, at a place of the drawing
     this.svg.addEventListener("wheel", (event) => { event.preventDefault(); this.zoom(Math.exp(event.deltaY * 0.0015), this.place(event)); }, { passive: false });
-    this.svg.addEventListener("pointerdown", (event) => { this.from = this.place(event); this.svg.setPointerCapture(event.pointerId); });
+    this.svg.addEventListener("pointerdown", (event) => { this.from = this.place(event); this.down = [event.clientX, event.clientY]; this.svg.setPointerCapture(event.pointerId); });
     this.svg.addEventListener("pointermove", (event) => { if (this.from) { const to = this.place(event); this.move(this.from[0] - to[0], this.from[1] - to[1]); } });
     for (const end of ["pointerup", "pointercancel"]) this.svg.addEventListener(end, () => { this.from = null; });
+    this.svg.addEventListener("click", (event) => { if (Math.hypot(event.clientX - this.down?.[0], event.clientY - this.down?.[1]) < 4) this.onpick(this.place(event)); });
     this.svg.addEventListener("dblclick", () => this.fit());
     this.svg.addEventListener("keydown", (event) => this.#key(event));
   }

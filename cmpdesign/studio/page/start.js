@@ -15,7 +15,7 @@ export class StartPart {
     const card = (template) => h("button", { class: "card", onclick: () => open(template.fields) },
       h("img", { src: `/api/templates/${template.name}.svg`, alt: "", loading: "lazy" }), h("span", {}, h("b", {}, template.name), h("span", { class: "soft small" }, template.description)));
     this.element = h("div", { class: "start" },
-      h("div", { class: "hero" }, h("h1", {}, "A pad for your tactile sensor"), h("p", { class: "soft" }, "Choose a pattern, see what can be made and read, build its files, and read its pictures. All of it stays on this machine.")),
+      h("div", { class: "hero" }, h("h2", { class: "title" }, "A pad for your tactile sensor"), h("p", { class: "soft" }, "Choose a pattern, see what can be made and read, build its files, and read its pictures. All of it stays on this machine.")),
       h("section", {}, h("h2", {}, "Which pad for my camera?"), question),
       h("section", {}, h("h2", {}, "Templates"), h("div", { class: "cards" }, start.templates.map(card))), this.recent);
     for (const section of this.element.querySelectorAll("section")) section.firstChild?.classList.add("heading");

@@ -1,7 +1,7 @@
 // The part "Touch": a camera of this browser, or the source of "cmpdesign view", live: markers and arrows of one view,
 // the surface and forces of several. One frame is under way; the next is asked for when it has been drawn.
 
-import { figures, h, number } from "./base.js";
+import { ask, figures, h, number, toast } from "./base.js";
 import { design } from "./state.js";
 import { Surface } from "./surface.js";
 
@@ -18,13 +18,27 @@ export class TouchPart {
     this.plotWords = h("p", { class: "small soft" });
     this.factor = h("input", { type: "range", min: 1, max: 30, step: 1, value: 5, id: "factor", oninput: () => this.#draw() });
     this.space = h("div", { class: "canvas" }, this.canvas);
+    this.cameras = h("select", { "aria-label": "Camera of this machine" });
+    this.kind = h("select", { "aria-label": "Format of the recording" }, start.recorded.map((kind) => h("option", { value: kind }, `.${kind}`)));
+    this.record = h("button", { "aria-pressed": "false", disabled: true, onclick: () => this.socket?.send(this.isRecording ? "save" : `record ${this.kind.value}`) }, "● Record");
+    this.rest = h("button", { disabled: true, onclick: () => this.socket?.send("rest") }, "This is rest");
     const button = (text, act, kind = "") => h("button", { class: kind, onclick: act }, text);
     this.element = h("div", { class: "work two" }, h("aside", { class: "side", "aria-label": "Source and health" },
       h("div", { class: "box" }, h("h2", {}, "Source"), start.live && button(`Show ${start.live}`, () => this.#openSource(), "primary"), button("Use the camera of this browser", () => this.#openCamera(), start.live ? "" : "primary"),
-        h("div", { class: "row" }, button("This is rest", () => this.socket?.send("rest")), button("Stop", () => this.#stop("Stopped."))), h("p", { class: "soft small" }, "The camera is read with the layout of the present design. Another source: cmpdesign view LAYOUT SOURCE.")),
+        h("div", { class: "row" }, h("span", { class: "grow" }, this.cameras), this.machine = button("Use", () => this.#openMachine())),
+        h("div", { class: "row" }, this.rest, button("Stop", () => this.#stop("Stopped."))), h("div", { class: "row" }, this.record, h("span", { class: "grow" }, this.kind)), h("p", { class: "soft small" }, "The camera is read with the layout of the present design. Another source: cmpdesign view LAYOUT SOURCE.")),
       h("div", { class: "box" }, h("label", { for: "factor" }, "Arrows and heights, enlarged"), this.factor), h("div", { class: "box" }, h("h2", {}, "Running"), this.plot, this.plotWords), this.health), h("section", { class: "stage", "aria-label": "Live" }, this.space, this.words), this.video);
     this.isWanted = Boolean(start.live);
+    this.#listCameras();
     new ResizeObserver(() => this.#draw()).observe(this.space);
+  }
+
+  // The cameras that this machine itself reads, at their own rate.
+  async #listCameras() {
+    const { cameras, problem } = await ask("/api/cameras").catch((error) => ({ cameras: [], problem: error.message }));
+    this.cameras.replaceChildren(...(cameras.length ? cameras.map((one) => h("option", { value: one.number }, one.name)) : [h("option", {}, "No camera of this machine")]));
+    this.cameras.disabled = this.machine.disabled = !cameras.length;
+    this.cameras.title = problem;
   }
 
   refresh() { if (this.isWanted && !this.socket) { this.isWanted = false; this.#openSource(); } }
@@ -39,17 +53,37 @@ export class TouchPart {
       if (typeof data !== "string") { await onframe(data); return; }
       const told = JSON.parse(data);
       if (told.over !== undefined) { this.#stop(told.over); return; }
+      if (told.note !== undefined) { toast(told.note); this.#setRecording(false); return; }
+      if (told.recording) { this.#setRecording(true); return; }
+      if (told.saved) { this.#setRecording(false); this.#download(told); return; }
       if (told.cells) { this.pad = told; this.words.textContent = told.name; await onframe(null); return; }
       this.frame = told;
       await onframe(told);
     };
     socket.onclose = ({ reason }) => { if (socket === this.socket) this.#stop(reason || "The connection has ended."); };
     this.socket = socket;
+    this.record.disabled = this.rest.disabled = false;
+  }
+
+  // Displacements of one recording have one rest.
+  #setRecording(isOn) {
+    this.isRecording = isOn;
+    this.record.setAttribute("aria-pressed", String(isOn));
+    this.record.textContent = isOn ? "■ Save" : "● Record";
+    this.rest.disabled = this.kind.disabled = isOn;
+  }
+
+  #download({ saved, name, frames }) {
+    h("a", { href: `/api/recordings/${saved}`, download: name }).click();
+    toast(`${frames} frames are in ${name}.`);
   }
 
   // A frame is a document and then its image.
-  #openSource() {
-    this.#connect("/live/source", async (data) => {
+  #openSource() { this.#follow("/live/source"); }
+  #openMachine() { this.#follow(`/live/machine?${new URLSearchParams({ camera: this.cameras.value, fields: JSON.stringify(design.fields) })}`); }
+
+  #follow(path) {
+    this.#connect(path, async (data) => {
       if (data instanceof ArrayBuffer) {
         this.image = data.byteLength ? await createImageBitmap(new Blob([data], { type: "image/jpeg" })) : null;
         this.#draw();
@@ -86,6 +120,8 @@ export class TouchPart {
     socket?.close();
     for (const track of this.stream?.getTracks() ?? []) track.stop();
     this.stream = null;
+    this.#setRecording(false);
+    this.record.disabled = this.rest.disabled = true;
     this.words.textContent = text;
   }
 

@@ -23,7 +23,7 @@ from cmpdesign.reading.read_layout import read_layout
 from tests.support.command import run
 from tests.support.made.seen_pads import SeenCell, SeenPad, carved_pad, cast_pad, read_seen
 
-LEAST_SHARE, RMS_PITCHES, WORST_PITCHES = 0.99, 0.005, 0.025
+LEAST_SHARE, RMS_PITCHES, WORST_PITCHES = 0.99, 0.005, 0.02
 TRIANGULAR = ("digit", "elliptical", "gelsight-mini", "honeycomb", "round", "tac3d")
 
 
@@ -144,7 +144,9 @@ def test_later_cells_replace_earlier_ones() -> None:
 
 
 def test_a_deviation_names_its_parameter_and_what_cannot_be_read_is_an_error(tmp_path: Path) -> None:
-    result = run("check", "gelsight-mini", "--read", "--set", "laser.face=front")
+    result = run(
+        "check", "gelsight-mini", "--read", "--set", "laser.face=front", "--set", "sheet.dot_gain_mm=0.06"
+    )
     assert result.exit_code == 0
     text = " ".join(result.stdout.split())
     assert "change laser.face" in text and "sheet.dot_gain_mm" in text

@@ -192,6 +192,32 @@ def test_good_and_bad_pictures(page: Any, tmp_path: Path) -> None:
     assert page.locator(".stages button").count() > 3
 
 
+def test_two_stills_are_compared_and_another_layout_is_read(page: Any, tmp_path: Path) -> None:
+    layout, other = cmpdesign.load("tac3d").layout, cmpdesign.load("honeycomb", layers=5).layout
+    for name, press_mm in (("rest", 0.0), ("pressed", 0.3)):
+        image = cmpdesign.render(layout, pitch_px=22, press_mm=press_mm, noise=1, seed=3).image
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image)
+    cv2.imwrite(str(tmp_path / "other.png"), cmpdesign.render(other, noise=1).image)
+    open_template(page, "tac3d")
+    page.click("nav >> text=Read")
+    page.set_input_files("#picture", tmp_path / "rest.png")
+    page.wait_for_selector(".finding.good:has-text('331 of 331')")
+    page.click("button:text-is('This is rest')")
+    page.set_input_files("#picture", tmp_path / "pressed.png")
+    page.wait_for_selector(".note:has-text('from rest.png: largest 0.3 mm')")
+    assert page.get_attribute("path.arrows", "d").count("M") == 2 * 331
+    with page.expect_download() as download:
+        page.click("text=Save as track does")
+    download.value.save_as(tmp_path / "run.npz")
+    assert cmpdesign.load_run(tmp_path / "run.npz").arrays["displacement_mm"].shape == (2, 331, 2)
+    page.click("text=Other layout")
+    page.fill("dialog textarea", other.to_json())
+    page.click("text=Take over")
+    page.wait_for_selector("text=Read with: honeycomb, 91 markers")
+    page.set_input_files("#picture", tmp_path / "other.png")
+    page.wait_for_selector(".finding.good:has-text('91 of 91')")
+
+
 def test_200_frames_of_a_camera_against_the_truth(chrome: Any, address: str, tmp_path: Path) -> None:
     """Chromium's camera is a file of rendered frames; the page's markers are compared with the frames' truth."""
     layout = cmpdesign.load("tac3d").layout

@@ -6,12 +6,15 @@ import io
 import json
 import re
 import socket
+import time
 import zipfile
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
@@ -22,10 +25,14 @@ from cmpdesign.api.sequences import track_job
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import to_png
 from cmpdesign.products.drawing.svg import layout_to_svg
+from cmpdesign.products.laser.coupon.design import coupon_to_json, design_coupon
+from cmpdesign.products.laser.grid.design import design_grid
+from cmpdesign.products.laser.setup import complete_setup
 from cmpdesign.studio.app import PAGE, make_app
 from cmpdesign.studio.guard import Door
 from cmpdesign.studio.live import LiveFeed
 from cmpdesign.studio.serving import serve
+from tests.support.laser_tools import coupon_photo
 
 DOOR = Door("127.0.0.1", 8300, "the-token-of-this-run")
 HOME, SOCKETS = "http://127.0.0.1:8300", "ws://127.0.0.1:8300"
@@ -253,3 +260,122 @@ def test_a_run_is_shown_and_recorded(tmp_path: Path) -> None:
             assert socket.receive_bytes().startswith(b"\xff\xd8")
             socket.send_text("next")
             assert socket.receive_json() == {"over": "the source has ended"}
+
+
+# -- more than one picture
+
+
+def dropped(page: TestClient, image: Any, fields: dict[str, Any] = FIELDS, **query: str) -> dict[str, Any]:
+    asked = {"fields": json.dumps(fields), "name": "seen.png", **query}
+    answer = page.post("/api/readings", params=asked, content=to_png(image))
+    assert answer.status_code == 200, answer.text
+    return dict(answer.json())
+
+
+def test_displacements_between_two_stills_and_their_table(page: TestClient, tmp_path: Path) -> None:
+    """The displacement of the truth, and the table that ``track`` writes."""
+    layout = cmpdesign.Design(**FIELDS).layout
+    stills = [cmpdesign.render(layout, pitch_px=30, press_mm=mm, noise=1, seed=1) for mm in (0, 0.4)]
+    rest, pressed = (dropped(page, still.image) for still in stills)
+    moved = page.get(f"/api/readings/{pressed['key']}/moved", params={"rest": rest["key"]}).json()
+    truth_px = (stills[1].truth.marker_xy_px - stills[0].truth.marker_xy_px)[pressed["ids"]]
+    assert np.abs(np.array(moved["px"]) - truth_px).max() < 0.2
+    assert 0.35 < moved["largest_mm"] < 0.45 and 0 < np.median(moved["sigma_px"]) < 0.02
+    flat = page.get(f"/api/readings/{rest['key']}/moved").json()
+    assert flat["largest_mm"] < 0.01 and flat["from"] is None
+    keys = [rest["key"], pressed["key"]]
+    data = page.post("/api/tracks", json={"keys": keys, "rest": rest["key"], "kind": "npz"}).content
+    (tmp_path / "run.npz").write_bytes(data)
+    run = cmpdesign.load_run(tmp_path / "run.npz").arrays["displacement_mm"]
+    assert np.nanmax(np.linalg.norm(run[1], axis=1)) == pytest.approx(moved["largest_mm"], abs=1e-4)
+    other = dropped(page, cmpdesign.render(layout, size=(500, 500), pitch_px=30, noise=1).image)
+    answer = page.get(f"/api/readings/{other['key']}/moved", params={"rest": rest["key"]})
+    assert answer.status_code == 422 and "differ in layout or size" in answer.json()["error"]
+    assert "1 to 40 pictures" in refused(page, "/api/tracks", json={"keys": keys * 30, "kind": "npz"})
+    assert "expected one of npz" in refused(page, "/api/tracks", json={"keys": keys, "kind": "../x"})
+
+
+def test_a_picture_is_read_with_another_layout(page: TestClient) -> None:
+    other = cmpdesign.load("honeycomb", layers=4).layout
+    image = cmpdesign.render(other, pitch_px=30, noise=1).image
+    opened = page.post("/api/layouts", content=other.to_json()).json()
+    assert opened["about"] == "honeycomb, 61 markers"
+    assert dropped(page, image, layout=opened["key"])["measured"] == 61
+    assert "does not fit the layout" in dropped(page, image)["reason"]
+    assert "version is missing" in refused(page, "/api/layouts", content='{"format": "cmp-layout"}')
+
+
+@pytest.mark.slow
+def test_a_coupon_and_a_grid_are_recognised(page: TestClient, tmp_path: Path) -> None:
+    """A photo of the coupon of the design's own laser job is read as the call reads it; so is another job's, by its
+    file, and a burnt grid."""
+    setup = complete_setup(cmpdesign.Design(**FIELDS).laser)
+    coupon, grid = design_coupon(setup), design_grid(setup)
+    photo = coupon_photo(coupon, {patch.name: (0.1, 0.12) for patch in coupon.patches}, scale_px_mm=11.8)
+    (tmp_path / "coupon.json").write_text(coupon_to_json(coupon), encoding="utf-8")
+    (tmp_path / "seen.png").write_bytes(to_png(photo))
+    expected = cmpdesign.kerf(tmp_path / "coupon.json", tmp_path / "seen.png").to_json(coupon)
+    assert dropped(page, photo)["kerf"] == expected
+    opened = page.post("/api/layouts", content=coupon_to_json(coupon)).json()
+    assert opened["about"].startswith("kerf coupon")
+    assert dropped(page, photo, {**FIELDS, "layers": 4}, layout=opened["key"])["kerf"] == expected
+    cut = [patch for patch in grid.patches if patch.speed_mm_s <= 30]
+    burnt = coupon_photo(replace(grid, patches=tuple(cut)), {patch.name: (0.15, 0.15) for patch in cut})
+    assert dropped(page, burnt)["grid"]["best"] is not None
+
+
+def test_a_camera_of_this_machine_is_shown_and_recorded(
+    page: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = cmpdesign.render(cmpdesign.Design(**FIELDS).layout, pitch_px=30, noise=1).image
+
+    class Camera:
+        """Stands for OpenCV's reader of a camera."""
+
+        def isOpened(self) -> bool:
+            return True
+
+        def get(self, key: int) -> float:
+            sizes = {cv2.CAP_PROP_FRAME_WIDTH: 640.0, cv2.CAP_PROP_FRAME_HEIGHT: 480.0}
+            return sizes.get(key, 0.0 if key == cv2.CAP_PROP_POS_MSEC else -1)
+
+        def getBackendName(self) -> str:
+            return "V4L2"
+
+        def read(self) -> tuple[bool, Any]:
+            time.sleep(0.01)
+            return True, image
+
+        def release(self) -> None:
+            pass
+
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: Camera())
+    address = f"{SOCKETS}/live/machine?camera=0&fields={json.dumps(FIELDS)}"
+    with page.websocket_connect(address, headers={"origin": HOME}) as socket:
+        assert socket.receive_json()["markers"] == 37
+        socket.send_text("save")
+        assert "no frame was recorded" in socket.receive_json()["note"]
+        socket.send_text("record npz")
+        assert socket.receive_json() == {"recording": True}
+        for _ in range(5):
+            socket.send_text("next")
+            assert socket.receive_json()["measured"] == 37
+            assert socket.receive_bytes().startswith(b"\xff\xd8")
+        socket.send_text("save")
+        saved = socket.receive_json()
+    data = page.get(f"/api/recordings/{saved['saved']}").content
+    run = np.load(io.BytesIO(data))
+    assert len(run["frame"]) == saved["frames"] >= 4 and (run["status"] == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("address", "asked", "said"),
+    [
+        ("design", {"fields": FIELDS, "camera": 7}, "camera: expected"),
+        ("seen", {"fields": FIELDS, "camera": [99999, 99999]}, "at most 60 megapixels"),
+        ("tracks", {"keys": 7, "kind": "npz"}, "keys: expected a list"),
+        ("builds", {"fields": FIELDS, "products": 7}, "products: expected a list"),
+    ],
+)
+def test_a_value_of_another_type_is_refused(page: TestClient, address: str, asked: Any, said: str) -> None:
+    assert said in refused(page, f"/api/{address}", json=asked)

@@ -151,14 +151,12 @@ def load_coupon(path: str | Path) -> Coupon:
         CouponError: the file cannot be read or does not describe a coupon; one line that names the field.
     """
     try:
-        return _parse_coupon(parse_json(read_text(path, _MAX_BYTES), str(path)))
+        document = parse_json(read_text(path, _MAX_BYTES), str(path))
     except InputError as error:
         raise CouponError(
             f"{error}; expected a coupon.json as build writes it for the product laser"
         ) from None
-    except ValidationError as error:
-        message = validation_message(error, _CouponFile)
-        raise CouponError(f"{path}: {message}; expected a coupon.json as build writes it") from None
+    return parse_coupon(document, str(path))
 
 
 class _StrictModel(BaseModel):
@@ -195,8 +193,17 @@ class _CouponFile(_StrictModel):
     kind: Literal["kerf", "grid"] = "kerf"
 
 
-def _parse_coupon(document: Any) -> Coupon:
-    data = _CouponFile.model_validate(document)
+def parse_coupon(document: Any, name: str) -> Coupon:
+    """The coupon of the JSON object of a ``coupon.json``; ``name`` is for messages.
+
+    Raises:
+        CouponError: see ``load_coupon``.
+    """
+    try:
+        data = _CouponFile.model_validate(document)
+    except ValidationError as error:
+        message = validation_message(error, _CouponFile)
+        raise CouponError(f"{name}: {message}; expected a coupon.json as build writes it") from None
     patches = tuple(
         Patch(
             patch.name,

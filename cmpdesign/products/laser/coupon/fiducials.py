@@ -74,13 +74,39 @@ def _assign_fiducials(candidates: Values, marks: Values, diameter_mm: float) -> 
     best: tuple[float, Values] | None = None
     for start in range(max(len(candidates) - 4, 0)):
         similar = candidates[start:][candidates[start:, 2] > 0.4 * candidates[start, 2]][:MAX_CANDIDATES]
-        for four in permutations(range(len(similar)), 4):
+        for four in _plausible_assignments(similar, marks):
             found = _score_assignment(similar, four, marks, diameter_mm)
             if found is not None and (best is None or found[0] < best[0]):
                 best = found
         if best is not None:
             return best
     return None
+
+
+def _plausible_assignments(similar: Values, marks: Values) -> list[tuple[int, ...]]:
+    """Four candidates for the first four marks, of which the fifth mark's place has another candidate near.
+
+    The homography by determinants: it maps the mark s_i to a multiple of the candidate t_i, in homogeneous coordinates.
+    """
+    fours = np.array(list(permutations(range(len(similar)), 4)))
+    places = np.column_stack([similar[:, :2], np.ones(len(similar))])
+    weights = _shares(np.column_stack([marks[:4], np.ones(4)])[None])[0]
+    fifth = np.linalg.solve(np.column_stack([marks[:3], np.ones(3)]).T, [*marks[4], 1.0])
+    chosen = places[fours]
+    mapped = np.einsum("pi,pij->pj", _shares(chosen) * (fifth / weights), chosen[:, :3])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.linalg.norm(similar[None, :, :2] - (mapped[:, :2] / mapped[:, 2:])[:, None], axis=2)
+    away /= np.sqrt(4 * similar[:, 2] / np.pi)
+    np.put_along_axis(away, fours, np.inf, axis=1)
+    # the places by float32, in the scoring, differ a little
+    return [tuple(four) for four in fours[away.min(axis=1) < 1.5 * MAX_FIFTH_MARK_ERROR].tolist()]
+
+
+def _shares(four: Values) -> Values:
+    """(P, 3): the fourth of (P, 4, 3) points as a sum of the first three, times their determinant."""
+    with_fourth = np.stack([four[:, [3, 1, 2]], four[:, [0, 3, 2]], four[:, [0, 1, 3]]], axis=1)
+    shares: Values = np.linalg.det(with_fourth)
+    return shares
 
 
 def _score_assignment(
@@ -95,20 +121,25 @@ def _score_assignment(
 
     source = marks[:4].astype(np.float32)
     homography = cv2.getPerspectiveTransform(source, similar[list(four), :2].astype(np.float32))
+    others = [i for i in range(len(similar)) if i not in four]
+    fifth = _project_points(homography, marks[4:])
+    if not others or not np.isfinite(fifth).all():
+        return None
+    # most assignments fail here, so that the places of the rims come later
+    distance = np.linalg.norm(np.subtract(similar[others, :2], fifth), axis=1)
+    five = similar[[*four, others[int(distance.argmin())]]]
+    diameter = np.sqrt(4 * five[:, 2] / np.pi)
+    fifth_error = float(distance.min()) / float(diameter[4])
+    if fifth_error > MAX_FIFTH_MARK_ERROR:
+        return None
     compass = diameter_mm / 2 * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
     rims = _project_points(homography, (marks[:, None] + compass).reshape(-1, 2)).reshape(5, 4, 2)
     width = np.linalg.norm(rims[:, 0] - rims[:, 1], axis=1)
     height = np.linalg.norm(rims[:, 2] - rims[:, 3], axis=1)
-    others = [i for i in range(len(similar)) if i not in four]
-    if not others or not np.isfinite(rims).all() or min(width.min(), height.min()) <= 1:
+    if not np.isfinite(rims).all() or min(width.min(), height.min()) <= 1:
         return None
-    fifth = _project_points(homography, marks[4:])
-    distance = np.linalg.norm(np.subtract(similar[others, :2], fifth), axis=1)
-    five = similar[[*four, others[int(distance.argmin())]]]
-    diameter = np.sqrt(4 * five[:, 2] / np.pi)
     stretch = max(np.abs(np.log(diameter / np.sqrt(width * height)))) + max(np.abs(np.log(width / height)))
-    fifth_error = float(distance.min()) / float(diameter[4])
-    if fifth_error > MAX_FIFTH_MARK_ERROR or stretch > MAX_STRETCH:
+    if stretch > MAX_STRETCH:
         return None
     return float(fifth_error + stretch), five[:, :2]
 

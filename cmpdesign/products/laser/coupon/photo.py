@@ -9,6 +9,7 @@ other face.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -86,6 +87,40 @@ class CouponReading:
             0.0 if face == self.face else (self.narrowing_mm if face == "front" else -self.narrowing_mm)
         )
         return MeasuredWidth(seen.value_mm + widening, seen.sigma_mm)
+
+    def to_json(self, coupon: Coupon) -> dict[str, Any]:
+        """The reading of a coupon as in the document of ``kerf``."""
+        return {
+            "format": "cmp-kerf",
+            "version": 2,
+            "from_back": self.from_back,
+            "face": self.face,
+            "taper_deg": coupon.taper_deg,
+            "taper_assumed": coupon.taper_assumed,
+            "thickness_mm": coupon.thickness_mm,
+            "response": self.response,
+            "scale_px_mm": round(self.scale_px_mm, 4),
+            "fit_mm": round(self.fit_mm, 6),
+            "patches": [
+                {
+                    "name": one.patch.name,
+                    "power_percent": one.patch.power_percent,
+                    "speed_mm_s": one.patch.speed_mm_s,
+                    "passes": one.patch.passes,
+                    **self._axis_to_json("x", one.x),
+                    **self._axis_to_json("y", one.y),
+                }
+                for one in self.patches
+            ],
+        }
+
+    def _axis_to_json(self, axis: str, seen: MeasuredWidth) -> dict[str, float]:
+        """Kerfs at the front (as in a material's file) and at the back, and their deviation."""
+        return {
+            f"kerf_{axis}_mm": round(self.at_face("front", seen).value_mm, 5),
+            f"kerf_{axis}_back_mm": round(self.at_face("back", seen).value_mm, 5),
+            f"kerf_{axis}_sigma_mm": round(seen.sigma_mm, 5),
+        }
 
 
 def read_coupon(

@@ -1,11 +1,15 @@
-"""The photograph of a grid: which windows are cut through, and the depth that one pass burns."""
+"""The photograph of a grid: which windows are cut through, and how deep the others are.
+
+A groove's shade is no measure of its depth. Depths follow from what is cut through: passes of one setting burn equally
+deep, and neither less power nor more speed burns deeper.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -43,8 +47,9 @@ class FieldReading:
         power_percent, speed_mm_s: its settings.
         states: number of passes -> what the window shows.
         passes: the fewest passes that cut through, if all larger numbers do, too; None: none.
-        depth_per_pass_mm: lower and upper bound of what one pass burns. The upper bound is infinite where the first
-            window is open; both are None where no window is.
+        depth_per_pass_mm: lower and upper bound of what one pass burns, by the windows of all fields; 0 and infinity
+            where no window gives a bound.
+        thickness_mm: of the sheet.
     """
 
     name: str
@@ -52,7 +57,19 @@ class FieldReading:
     speed_mm_s: float
     states: dict[int, WindowState]
     passes: int | None
-    depth_per_pass_mm: tuple[float, float] | None
+    depth_per_pass_mm: tuple[float, float]
+    thickness_mm: float
+
+    @property
+    def depths_mm(self) -> dict[int, tuple[float, float]]:
+        """Number of passes -> lower and upper bound of a window's depth; the thickness where the window is open."""
+        low, high = self.depth_per_pass_mm
+        return {
+            passes: (self.thickness_mm, self.thickness_mm)
+            if state == "through"
+            else (passes * low, min(passes * high, self.thickness_mm))
+            for passes, state in self.states.items()
+        }
 
     @property
     def time_s_mm(self) -> float:
@@ -72,6 +89,27 @@ class GridReading:
     def best(self) -> FieldReading | None:
         cut = [one for one in self.fields if one.passes is not None and one.passes < max(one.states)]
         return min(cut, key=lambda one: one.time_s_mm, default=None)
+
+    def to_json(self) -> dict[str, Any]:
+        """The reading as in the document of ``kerf``."""
+        fields = []
+        for one in self.fields:
+            low, high = one.depth_per_pass_mm
+            fields.append(
+                {
+                    "name": one.name,
+                    "power_percent": one.power_percent,
+                    "speed_mm_s": one.speed_mm_s,
+                    "windows": one.states,
+                    "depths_mm": one.depths_mm,
+                    "passes": one.passes,
+                    "least_depth_per_pass_mm": low,
+                    "most_depth_per_pass_mm": None if high == float("inf") else high,
+                }
+            )
+        best = None if self.best is None else self.best.name
+        scale = round(self.scale_px_mm, 4)
+        return {"scale_px_mm": scale, "from_back": self.from_back, "best": best, "fields": fields}
 
 
 def read_grid(grid: Coupon, image: Image, response: Response = "srgb") -> GridReading:
@@ -93,7 +131,23 @@ def read_grid(grid: Coupon, image: Image, response: Response = "srgb") -> GridRe
     fields = []
     for _, windows in groupby(zip(grid.patches, states, strict=True), key=lambda pair: field_of(pair[0])):
         fields.append(_field(list(windows), grid.thickness_mm))
-    return GridReading(tuple(fields), fit.scale, fit.from_back)
+    return GridReading(_with_bounds_of_others(fields), fit.scale, fit.from_back)
+
+
+def _with_bounds_of_others(fields: Sequence[FieldReading]) -> tuple[FieldReading, ...]:
+    """A pass burns at most as deep as one of no less power and no more speed, and at least as deep as the reverse."""
+    bounded = []
+    for one in fields:
+        stronger = [each for each in fields if _burns_as_deep(each, one)]
+        weaker = [each for each in fields if _burns_as_deep(one, each)]
+        low = max(each.depth_per_pass_mm[0] for each in weaker)
+        high = min(each.depth_per_pass_mm[1] for each in stronger)
+        bounded.append(replace(one, depth_per_pass_mm=(low, high)))
+    return tuple(bounded)
+
+
+def _burns_as_deep(one: FieldReading, other: FieldReading) -> bool:
+    return one.power_percent >= other.power_percent and one.speed_mm_s <= other.speed_mm_s
 
 
 def _ground_light(grid: Coupon, picture: CouponPicture) -> float:
@@ -142,10 +196,15 @@ def _field(windows: Sequence[tuple[Patch, WindowState]], thickness_mm: float) ->
     closed = [passes for passes, state in states.items() if state != "through"]
     last_closed = max(closed, default=0)
     cut = [passes for passes in states if passes > last_closed]
-    depth = None
-    if cut:
-        depth = (thickness_mm / min(cut), thickness_mm / last_closed if last_closed else float("inf"))
+    low = thickness_mm / min(cut) if cut else 0.0
+    high = thickness_mm / last_closed if last_closed else float("inf")
     first = windows[0][0]
     return FieldReading(
-        field_of(first), first.power_percent, first.speed_mm_s, states, min(cut, default=None), depth
+        name=field_of(first),
+        power_percent=first.power_percent,
+        speed_mm_s=first.speed_mm_s,
+        states=states,
+        passes=min(cut, default=None),
+        depth_per_pass_mm=(low, high),
+        thickness_mm=thickness_mm,
     )

@@ -82,10 +82,14 @@ def test_every_window_is_read_back(beam: float, view: dict[str, Any]) -> None:
     read = {(one.name, passes): state for one in reading.fields for passes, state in one.states.items()}
     assert read == {(field_of(patch), patch.passes): true_state(patch, beam) for patch in GRID.patches}
     assert len(set(read.values())) >= 2
+    widths = []
     for one in reading.fields:
-        if one.depth_per_pass_mm is not None:
-            low, high = one.depth_per_pass_mm
-            assert low <= beam * one.power_percent / one.speed_mm_s < high
+        for passes, (low, high) in one.depths_mm.items():
+            true = passes * beam * one.power_percent / one.speed_mm_s
+            assert low - 1e-9 <= min(true, GRID.thickness_mm) <= high + 1e-9
+            widths.append((high - low) / GRID.thickness_mm)
+    # a field without a through window gets bounds from the others
+    assert np.median(widths) < 0.5, np.round(widths, 2)
 
 
 def test_the_best_field_is_the_quickest_with_a_pass_in_reserve() -> None:

@@ -19,6 +19,7 @@ from cmpdesign.design.design import Design
 from cmpdesign.errors import DesignError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.files.resolution import resolution_dpi
+from cmpdesign.patterns.colors import WHITE
 from cmpdesign.products.sheet.key import SheetKey, parse_key
 from cmpdesign.products.sheet.page import FilledPolygons, TextLine
 from cmpdesign.products.sheet.print_sheet import made_pad, make_print_page, make_print_sheet
@@ -192,11 +193,19 @@ def test_a_film_has_its_side_its_boxes_and_a_white_layer_if_clear(
 
 @pytest.mark.parametrize("gain_mm", [0.0, 0.05])
 def test_dot_gain_makes_the_cells_smaller(gain_mm: float) -> None:
-    """The black moves every side of an equilateral triangle inward."""
+    """The black moves the sides of equilateral triangles inward, but not those of the white cell."""
     parameters = design(**{"sheet.dot_gain_mm": str(gain_mm)})
-    made = made_pad(parameters, build_layout(parameters))
-    share = (1 - 2 * np.sqrt(3) * gain_mm / 1.5) ** 2
-    assert made.figures()["area_percent"] == pytest.approx(100 * share, abs=1e-3)
+    layout = build_layout(parameters)
+    made = made_pad(parameters, layout)
+    shares = np.array([Polygon(ring).area for ring in made.layout.colored_outlines_mm]) / (
+        np.sqrt(3) / 4 * 1.5**2
+    )
+    (white,) = np.flatnonzero(layout.cell_color[layout.colored_cells] == WHITE)
+    # a side that moves takes a third of this from the triangle's height
+    less = 2 * np.sqrt(3) * gain_mm / 1.5
+    assert shares[white] == pytest.approx(1, abs=1e-9)
+    np.testing.assert_allclose(np.sort(np.delete(shares, white))[-3:], (1 - 2 * less / 3) ** 2)
+    np.testing.assert_allclose(np.sort(np.delete(shares, white))[:-3], (1 - less) ** 2)
     closed = design(**{"sheet.dot_gain_mm": "0.45"})
     with pytest.raises(
         DesignError, match=r"0\.45: the ink closes cells, whose smallest inner radius is 0\.433"
