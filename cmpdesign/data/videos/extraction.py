@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +21,7 @@ from cmpdesign.files.images import ImageFileError, is_image_file, read_image
 from cmpdesign.files.layout_json import layout_to_json, pattern_digest
 from cmpdesign.inputs.sources import SourceKind, name_sources
 from cmpdesign.reading.read_layout import layout_from_reference
-from extractor import Extractor, Reference
+from extractor import Extractor, ImageError, Reference
 from extractor.image.input import Channels
 from extractor.pipeline import Side
 from extractor.presets import Preset
@@ -135,10 +136,10 @@ def range_rows(folder: Path, plan: Mapping[str, Any], number: int) -> list[Row]:
     extractor = _extractor(folder, plan["digest"])
     rows: list[Row] = []
     for frame in _frames(source, piece):
-        if frame.image is None:
-            values = lost_values(len(extractor.layout.layer), UNREADABLE)
-        else:
-            values = marker_values([extractor.extract(frame.image)])
+        values = lost_values(len(extractor.layout.layer), UNREADABLE)
+        if frame.image is not None:
+            with suppress(ImageError):  # too small: one frame does not end all
+                values = marker_values([extractor.extract(frame.image)])
         rows.append({"source": source["name"], "frame": frame.number, "time_s": frame.time_s, **values})
     if len(rows) != piece.frames:
         raise CmpDesignError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from cmpdesign.data.videos.pieces import piece_frames, video_pieces
 from cmpdesign.tracking.export.video import Codec, CodecVideo
 from cmpdesign.tracking.sources import open_source
 from extractor import Extractor, load_layout
-from tests.support.command import refused
+from tests.support.command import refused, run
 from tests.support.layouts import small_text
 from tests.support.tracking.scenes import LAYERS, moving
 
@@ -158,3 +159,26 @@ def test_what_cannot_be_read_in_parts_is_one_line(
     monkeypatch.chdir(sources)
     assert said in refused("extract", "layout.json", source, "-o", tmp_path / "out", "--workers", 1)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_picture_that_is_too_small_is_a_row_with_its_reason(sources: Path, tmp_path: Path) -> None:
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for name, size in (("a.png", 2), ("b.png", 40)):
+        cv2.imwrite(str(pictures / name), np.full((size, size, 3), 90, np.uint8))
+    result = run("extract", sources / "layout.json", pictures, "-o", tmp_path / "out", "--workers", 1)
+    assert result.exit_code == 0, result.output
+    assert [frame.values["reason"] for frame in load(tmp_path / "out")] == [["unreadable"], ["no_color"]]
+
+
+def test_a_file_with_sound_alone_is_one_line(sources: Path, tmp_path: Path) -> None:
+    with av.open(str(tmp_path / "sound.mp4"), "w") as file:
+        stream = file.add_stream("aac", rate=48000)
+        sound = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+        sound.sample_rate = 48000
+        for packet in (*stream.encode(sound), *stream.encode(None)):
+            file.mux(packet)
+    for command in ("extract", "track", "verify"):
+        output = () if command == "verify" else ("-o", tmp_path / "out.npz")
+        line = refused(command, sources / "layout.json", tmp_path / "sound.mp4", *output)
+        assert "sound.mp4: holds no video" in line
