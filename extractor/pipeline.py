@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from extractor.cells.cell_mesh import CellMesh, build_cell_mesh
-from extractor.cells.cells import EFFORTS, Cells, Effort, find_cells, has_color
+from extractor.cells.cells import CODED_EFFORTS, EFFORTS, Cells, Effort, find_cells, has_color
 from extractor.cells.region_growing import grow
 from extractor.cells.triangle_fit import fit_edges, regions_as_cells
 from extractor.complete.image_quality import (
+    SampledCells,
     measure_quality,
     measure_quality_without_numbers,
     sampled_cells,
@@ -33,10 +34,10 @@ from extractor.errors import LayoutError
 from extractor.image.input import Channels, convert_to_bgr
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response, light_of_values, response_tables
-from extractor.layout.lattice_tables import lattice_of
-from extractor.layout.layout_file import LayoutLike, layout_of
+from extractor.layout.lattice_tables import Lattice, lattice_of
+from extractor.layout.layout_file import LayoutLike, layouts_of
 from extractor.layout.reference import Reference
-from extractor.layout.topology import topology_of
+from extractor.layout.topology import Topology, topology_of
 from extractor.numbering.ink_fields import Palette
 from extractor.numbering.lattice_walk import Walk, cell_light, walk_cells
 from extractor.numbering.marker_places import InitialMarkers, merge_corners
@@ -124,11 +125,13 @@ class NumberedMarkers(NamedTuple):
         places: the markers at the places given by their cells.
         mirrored: the image shows the pattern's back.
         origin: the evidence that fixed the numbering.
+        pad: number of the pad in its family.
     """
 
     places: InitialMarkers
     mirrored: bool
     origin: Origin
+    pad: int = 0
 
 
 class ReadImage(NamedTuple):
@@ -164,15 +167,42 @@ class Stages:
         self.results |= {"seeds": found.cells, "mesh": found.mesh, "light": found.light, "walk": found.walk}
 
 
+class _Pad:
+    """What refinement, repair and quality need of one pad of a family; made when first needed."""
+
+    def __init__(self, layout: Reference, lattice: Lattice, preset: Preset) -> None:
+        self.layout, self.lattice = layout, lattice
+        self._preset: Preset = preset
+
+    @cached_property
+    def topology(self) -> Topology:
+        return topology_of(self.layout)
+
+    @cached_property
+    def refiner(self) -> Refiner:
+        return Refiner(self.topology, self._preset, self.layout.virtual_per_edge)
+
+    @cached_property
+    def sampled_cells(self) -> SampledCells:
+        return sampled_cells(self.layout)
+
+    def prepare(self) -> None:
+        """Make all of it, so that the first image does not wait."""
+        _ = self.refiner, self.sampled_cells
+
+
 class Extractor:
-    """Finds and numbers the markers of one layout in images. Can be pickled and copied.
+    """Finds and numbers the markers of one layout, or of the pads of a family, in images. Can be pickled and copied.
 
     >>> from extractor import Extractor
     >>> markers = Extractor("layout.json").extract(image)  # doctest: +SKIP
+    >>> markers = Extractor(["left.json", "right.json"]).extract(image)  # doctest: +SKIP
+    >>> markers.code  # doctest: +SKIP
 
     Args:
         layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
-            a layout of cmpdesign.
+            a layout of cmpdesign. Or a list of these, a family: pads that differ in their codes alone. An image is of
+            one of them, and ``Markers.code`` says of which one.
         preset: "balanced" or "accurate".
         response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
             of the light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
@@ -182,20 +212,21 @@ class Extractor:
         channels: the order of an image's colors: "bgr", as in OpenCV, or "rgb".
 
     Raises:
-        LayoutError: the layout is not a triangular pattern, or its file cannot be read.
+        LayoutError: the layout is not a triangular pattern, its file cannot be read, or layouts are no family.
         TypeError: ``layout`` is of another type.
         ValueError: no such preset, response, side or order of channels.
     """
 
     def __init__(
         self,
-        layout: LayoutLike,
+        layout: LayoutLike | Sequence[LayoutLike],
         preset: Preset = "balanced",
         response: Response | None = None,
         side: Side = "designed",
         channels: Channels = "bgr",
     ) -> None:
-        layout = layout_of(layout)
+        self.layouts = layouts_of(layout)
+        layout = self.layouts[0]
         if layout.cell_corners.shape[1] != 3:
             raise LayoutError(
                 f"pattern {layout.pattern!r} has no triangles; honeycomb, round or elliptical can be read"
@@ -215,15 +246,20 @@ class Extractor:
             depth: response_tables(light_of_values(usual if response is None else response))
             for depth, usual in by_depth.items()
         }
-        self._lattice = lattice_of(layout)
-        self._topology = topology_of(layout)
-        self._refiner = Refiner(self._topology, preset, layout.virtual_per_edge)
-        self._registration = Registration(self._lattice, Palette(dict(layout.palette)), self._mirrored)
-        self._sampled_cells = sampled_cells(layout)
+        self._pads = [_Pad(one, lattice_of(one), preset) for one in self.layouts]
+        lattices = [pad.lattice for pad in self._pads]
+        self._registration = Registration(lattices, Palette(dict(layout.palette)), self._mirrored)
+        self._cells = len(lattices[0].ink)
+        self._efforts = EFFORTS if layout.code is None else CODED_EFFORTS
+        self._pads[0].prepare()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is made from layout and options; buffers are not copied."""
-        return type(self), (self.layout, *self._options)
+        return type(self), (self.layouts, *self._options)
+
+    def layout_of(self, markers: Markers) -> Reference:
+        """The layout of the pad that markers are of; of a family without a numbered pad, the first one."""
+        return next((one for one in self.layouts if one.code and one.code.id == markers.code), self.layout)
 
     def extract(self, image: NDArray[Any]) -> Markers:
         """The markers in one image, found independently of other frames.
@@ -251,12 +287,14 @@ class Extractor:
             stages.record("quality", quality)
             return ReadImage(no_markers(self.layout, found.refusal.reason, stages, quality), None)
         (_, mesh, _, _), numbering = found
-        expected = with_missing_cells(mesh.corner_px, numbering, self._lattice)
+        lattice = self._pads[numbering.pad].lattice
+        expected = with_missing_cells(mesh.corner_px, numbering, lattice)
         triangles = stages.record(
             "triangles", expected.measured(fit_edges(pyramid.level(1), expected.corner_px))
         )
-        places = stages.record("place", merge_corners(triangles, self._lattice))
-        return self.finish(pyramid, NumberedMarkers(places, numbering.mirrored, numbering.origin), stages)
+        places = stages.record("place", merge_corners(triangles, lattice))
+        numbered = NumberedMarkers(places, numbering.mirrored, numbering.origin, numbering.pad)
+        return self.finish(pyramid, numbered, stages)
 
     def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:
         """An image for ``extract`` as contiguous (H, W, 3) uint8 BGR, None without color; raises ``ImageError``."""
@@ -277,15 +315,16 @@ class Extractor:
             stages: the record of the stages so far.
             before: appearance of the previous image of a sequence.
         """
-        places, size = numbered.places, pyramid.size
-        refined = stages.record("refine", self._refiner(pyramid, places, before))
-        repaired = repair_markers(refined, places, self._lattice, size)
-        rows = find_row_break(self._topology, repaired, size)
+        places, size, pad = numbered.places, pyramid.size, self._pads[numbered.pad]
+        layout, topology = pad.layout, pad.topology
+        refined = stages.record("refine", pad.refiner(pyramid, places, before))
+        repaired = repair_markers(refined, places, pad.lattice, size)
+        rows = find_row_break(topology, repaired, size)
         repaired = stages.record("repair", beside_row_break(rows, repaired))
-        virtual = partial(locate_virtual_markers, self._topology, repaired, refined.points, refined.scatter)
-        few = is_less_than_half_reported(repaired.xy_px, self.layout.xy_mm, self._lattice.present, size)
-        view, cells = pyramid.level(1), self._sampled_cells
-        quality = measure_quality(view, cells, repaired.xy_px, self._topology.edges, refined.blur_px)
+        virtual = partial(locate_virtual_markers, topology, repaired, refined.points, refined.scatter)
+        few = is_less_than_half_reported(repaired.xy_px, layout.xy_mm, pad.lattice.present, size)
+        view, edges = pyramid.level(1), topology.edges
+        quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)
         quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
         markers = Markers.with_later(
             virtual,
@@ -298,6 +337,7 @@ class Extractor:
             timings_ms=stages.timings_ms,
             stages=stages.results,
             quality=quality,
+            code=layout.code and layout.code.id,
         )
         return ReadImage(markers, refined.appearance)
 
@@ -321,7 +361,7 @@ class Extractor:
         little, then the others, the last one first. Looks with too small cells are left out."""
         skipped: list[FoundCells] = []
         before: FoundCells | None = None
-        for effort in EFFORTS:
+        for effort in self._efforts:
             found = self._find_cells(view, before.cells if before else None, effort, stages)
             gains = before is None or found.linked >= MIN_GAIN * before.linked
             before = found
@@ -337,7 +377,7 @@ class Extractor:
         self, view: PyramidLevel, before: Cells | None, effort: Effort, stages: Stages
     ) -> FoundCells:
         cells = stages.record("seeds", find_cells(view, self._largest_edge_px(view), effort, before))
-        if effort is not EFFORTS[0]:
+        if before is not None:
             cells = stages.record("grow", regions_as_cells(cells, grow(view, cells), view))
         mesh = stages.record("mesh", build_cell_mesh(cells))
         light = stages.record("light", cell_light(view, cells, mesh))
@@ -347,7 +387,7 @@ class Extractor:
     def _largest_edge_px(self, view: PyramidLevel) -> float:
         """The edges of this pattern where it fills the image, px at full scale."""
         pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
-        return math.sqrt(pixels / (2.0 * len(self._lattice.ink)) * 4.0 / math.sqrt(3.0))
+        return math.sqrt(pixels / (2.0 * self._cells) * 4.0 / math.sqrt(3.0))
 
     def _is_whole(self, found: FoundCells) -> bool:
         """Whether the cells of an image are all found, as far as the cells themselves show it."""

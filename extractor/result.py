@@ -124,6 +124,7 @@ class Markers(FrozenRecord):
         stages: stage name -> that stage's result, for debugging and drawing, read-only.
         origin: the evidence that fixed the numbering; None when no cell was numbered.
         quality: blur, noise, contrast, clipping, light and scale of the image; None when there was no color image.
+        code: id of the pad's code; None for a pad without a code, and when no cell was numbered.
     """
 
     xy_px: NDArray[np.float64]
@@ -138,6 +139,7 @@ class Markers(FrozenRecord):
     stages: Mapping[str, Any] = field(default_factory=dict, repr=False)
     origin: Origin | None = None
     quality: Quality | None = None
+    code: int | None = None
 
     def __post_init__(self) -> None:
         self._freeze_mappings("timings_ms", "stages")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -201,10 +201,10 @@ def render_sequence(
 
 @dataclass(frozen=True, eq=False)
 class Verifier:
-    """Gives verdicts on pictures of one pattern; the reader is made once.
+    """Gives verdicts on pictures of one pattern, or of the pads of a family; the reader is made once.
 
     Attributes:
-        reference: the layout.
+        layouts: the layout, or the layouts of a family, see ``extractor.Extractor``.
         min_share: share of the visible markers that must be measured, 0 to 1.
         response: relation of light and values, see ``extractor.Extractor``.
         channels: "bgr" or "rgb", the order of a picture's colors.
@@ -214,7 +214,7 @@ class Verifier:
         preset: see ``extractor.Extractor``.
     """
 
-    reference: Reference
+    layouts: Reference | Sequence[Reference]
     min_share: float = 0.9
     response: Literal["srgb", "linear"] | float | None = None
     channels: Literal["bgr", "rgb"] = "bgr"
@@ -222,12 +222,22 @@ class Verifier:
     max_pixels: int = MOST_PIXELS
     preset: Preset = "balanced"
 
+    @property
+    def family(self) -> Sequence[Reference]:
+        """The layouts."""
+        return self.layouts if isinstance(self.layouts, Sequence) else (self.layouts,)
+
+    @property
+    def reference(self) -> Reference:
+        """The layout; of a family, the first one."""
+        return self.family[0]
+
     @cached_property
     def extractor(self) -> Extractor:
         """The reader; made for the first picture."""
         from extractor import Extractor
 
-        return Extractor(self.reference, self.preset, self.response, "either")
+        return Extractor(self.layouts, self.preset, self.response, "either")
 
     def read(self, image: str | Path | NDArray[Any]) -> NDArray[Any]:
         """The picture as (H, W, 3) BGR.
@@ -250,10 +260,10 @@ class Verifier:
         from cmpdesign.products.sheet.verdict import judge_sheet
         from cmpdesign.reading.verify import verify as judge_pattern
 
-        sheet = judge_sheet(image, path, self.reference.digest, self.sheet_dpi)
+        sheet = judge_sheet(image, path, [one.digest for one in self.family], self.sheet_dpi)
         if sheet.is_sheet or self.sheet_dpi is not None:
             return sheet
-        return judge_pattern(self.extractor, self.reference, image, self.min_share)
+        return judge_pattern(self.extractor, image, self.min_share)
 
     def verify(self, image: str | Path | NDArray[Any]) -> Verdict | SheetVerdict:
         """Read and judge a picture: a file, or (H, W, 3) uint8 or uint16.
@@ -276,7 +286,7 @@ class VerifyOptions(TypedDict, total=False):
 
 
 def verify(
-    layout: LayoutLike | AnyLayout,
+    layout: LayoutLike | AnyLayout | Sequence[LayoutLike | AnyLayout],
     image: str | Path | NDArray[Any],
     *,
     report: str | Path | None = None,
@@ -290,7 +300,8 @@ def verify(
     For many pictures, ``Verifier(layout.reference()).verify(image)`` makes the reader once.
 
     Args:
-        layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
+        layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file; or a list of
+            these, a family of pads with different codes: ``verdict.markers.code`` says which pad it is.
         image: a file, or (H, W, 3) uint8 or uint16.
         report: file (.zip) that bundles picture, layout, settings and stages, to send with a picture that is not
             read; None: no file.
@@ -301,13 +312,17 @@ def verify(
 
     Raises:
         ImageFileError: a file or an array that is no color picture.
-        CmpDesignError: ``min_share`` is not from 0 to 1.
+        CmpDesignError: ``min_share`` is not from 0 to 1; a report with several layouts.
+        extractor.LayoutError: a layout that cannot be read, or layouts that are no family.
         OutputError: the report cannot be written.
     """
-    verifier = Verifier(reference_from(layout), **options)
+    layouts = [layout] if isinstance(layout, str) or not isinstance(layout, Sequence) else list(layout)
+    verifier = Verifier([reference_from(one) for one in layouts], **options)
+    if report is not None and len(layouts) != 1:
+        raise CmpDesignError("report: a bundle holds one layout; give the layout of the pad")
     verdict = verifier.verify(image)
     if report is not None:
-        _write_report(verifier, _layout_text(layout), image, verdict, Path(report))
+        _write_report(verifier, _layout_text(layouts[0]), image, verdict, Path(report))
     return verdict
 
 

@@ -57,6 +57,7 @@ class ImagePart(DocumentPart):
     lost: int | None = None
     share: float | None = Field(None, description="measured / present.")
     mirrored: bool | None = Field(None, description="The picture shows the pattern's back.")
+    code: int | None = Field(None, description="Id of the code of the pad that the picture shows.")
     contradictions: tuple[int, ...] | None = Field(
         None, description="Cells whose color contradicts the layout."
     )
@@ -71,7 +72,8 @@ class VerifyDocument(Document):
     format: Literal["cmp-verification"] = "cmp-verification"
     version: Literal[1] = 1
     pattern: str
-    digest: str = Field(description="Digest of the layout.")
+    digest: str = Field(description="Digest of the layout; of several, of the first.")
+    codes: tuple[int, ...] | None = Field(None, description="Codes of the layouts, if there are several.")
     min_share: float
     verified: bool = Field(description="True if all pictures are verified.")
     images: tuple[ImagePart, ...]

@@ -76,6 +76,8 @@ class Verdict:
             "mirrored",
         )
         document = {name: getattr(self, name) for name in names}
+        if self.markers.code is not None:
+            document["code"] = self.markers.code
         document["share"] = round(self.share, 6)
         document["contradictions"] = list(self.contradictions)
         document["quality"] = quality_to_json(self.markers.quality)
@@ -83,13 +85,12 @@ class Verdict:
         return document
 
 
-def verify(extractor: Extractor, reference: Reference, image: Image, min_share: float = MIN_SHARE) -> Verdict:
+def verify(extractor: Extractor, image: Image, min_share: float = MIN_SHARE) -> Verdict:
     """Extract the markers of one image and give a verdict.
 
     Args:
-        extractor: extractor for ``reference``; with ``side="either"`` the extractor reads both sides, and the verdict
-            distinguishes them.
-        reference: the layout.
+        extractor: of the layout, or of the layouts of a family; with ``side="either"`` the extractor reads both sides,
+            and the verdict distinguishes them.
         image: (H, W, 3) BGR, uint8 or uint16.
         min_share: least share of the present markers that must be measured, 0 to 1.
 
@@ -98,7 +99,9 @@ def verify(extractor: Extractor, reference: Reference, image: Image, min_share: 
     """
     if not 0 <= min_share <= 1:
         raise CmpDesignError(f"min_share is {min_share:g}; expected a share from 0 to 1")
-    verdict = judge_markers(reference, image, extractor.extract(image), min_share)
+    markers = extractor.extract(image)
+    reference = extractor.layout_of(markers)
+    verdict = judge_markers(reference, image, markers, min_share)
     if verdict.verified:
         return verdict
     misfit = other_pattern_reason(reference, image, verdict.markers)

@@ -27,21 +27,25 @@ class Effort(NamedTuple):
     """The maps and levels in which cells are sought.
 
     Attributes:
-        maps: number of the first maps.
+        maps: (K,) int64, their numbers: 0 to 2 the channels, 3 their sum, 4 to 6 each channel over the mean of the
+            others.
         shares: of the local contrast, the levels.
     """
 
-    maps: int
+    maps: NDArray[np.int64]
     shares: NDArray[np.float64]
 
 
 # Most images show every cell in a channel of its own; the others are looked at closely.
 # Chosen, for time.
 EFFORTS = (
-    Effort(3, np.array([0.5])),
-    Effort(7, np.array([0.32, 0.5, 0.65])),
-    Effort(7, np.array([0.2, 0.42, 0.75])),
+    Effort(np.arange(3), np.array([0.5])),
+    Effort(np.arange(7), np.array([0.32, 0.5, 0.65])),
+    Effort(np.arange(7), np.array([0.2, 0.42, 0.75])),
 )
+# The white cells of a coded pad lie at the sides of inks, and no channel shows both apart; a channel over the others
+# shows the ink alone.
+CODED_EFFORTS = (Effort(np.arange(4, 7), np.array([0.5])), *EFFORTS[1:])
 
 
 @dataclass(frozen=True, eq=False)

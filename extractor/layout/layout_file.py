@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,7 +20,7 @@ from extractor.errors import LayoutError
 from extractor.layout import json_fields as fields
 from extractor.layout.as_made_fields import read_as_made
 from extractor.layout.consistency import MAX_CODE, MAX_VIRTUAL_PER_EDGE
-from extractor.layout.reference import COLORS, PadCode, Reference
+from extractor.layout.reference import BLACK, COLORS, PadCode, Reference
 from extractor.layout.text_file import printable_path, read_text_file
 
 SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
@@ -67,6 +67,51 @@ def layout_of(given: LayoutLike) -> Reference:
             "(load_layout), the JSON object of a layout file, or a layout of cmpdesign"
         )
     return reference
+
+
+def layouts_of(given: LayoutLike | Sequence[LayoutLike]) -> tuple[Reference, ...]:
+    """One layout, or the layouts of a family: pads that differ in their codes, and as made in their markers' places.
+
+    Raises:
+        LayoutError: see ``load_layout``; no layout, or layouts that are no family.
+        TypeError: another value.
+    """
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        return (layout_of(given),)
+    layouts = tuple(layout_of(one) for one in given)
+    if not layouts:
+        raise LayoutError("no layout is given; give one, or the layouts of several pads with different codes")
+    first, *others = layouts
+    for number, other in enumerate(others, start=2):
+        differing = _not_of_family(first, other)
+        if differing:
+            raise LayoutError(
+                f"layouts 1 and {number} differ in {differing}; several layouts are those of pads that differ in "
+                "their codes alone; read other pads one by one"
+            )
+    codes = [one.code and one.code.id for one in layouts]
+    doubtful = next((code for code in codes if len(layouts) > 1 and (not code or codes.count(code) > 1)), 0)
+    if doubtful != 0:
+        same = f"the code {doubtful}" if doubtful else "no code"
+        raise LayoutError(
+            f"{codes.count(doubtful)} of {len(layouts)} layouts have {same}; pads are told apart by their codes: give "
+            "each its own"
+        )
+    return layouts
+
+
+def _not_of_family(one: Reference, other: Reference) -> str:
+    """What two layouts differ in that pads of one family have in common; empty for none."""
+    inks = [np.where(layout.cell_color < BLACK, layout.cell_color, BLACK) for layout in (one, other)]
+    pairs = {
+        "pattern": one.pattern == other.pattern,
+        "markers": np.array_equal(one.layer, other.layer) and np.array_equal(one.index, other.index),
+        "cells": np.array_equal(one.cell_corners, other.cell_corners) and np.array_equal(inks[0], inks[1]),
+        "virtual markers": one.virtual_per_edge == other.virtual_per_edge,
+        "palette": one.palette == other.palette,
+        "the side that is seen": one.mirrored == other.mirrored,
+    }
+    return next((name for name, is_same in pairs.items() if not is_same), "")
 
 
 def _json_text(document: Mapping[str, Any]) -> str:

@@ -4,10 +4,12 @@ What is unknown of a part is a motion: one of three turns, and a shift. All moti
 outside the layout, the naming of the inks, and the white cell's place, or the bits of a code. The part's motion is
 accepted if its lead over the second best is large. All other parts, a single cell being the smallest, are then
 registered against the placed ones by a smooth local map and their inks. A cell without a certain place has no number.
+Of a family of pads that differ in their codes alone, the pad is unknown, too: one more part of a motion.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,12 +21,11 @@ from extractor.cells.cell_mesh import CellMesh
 from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
-from extractor.numbering.code_bits import CodeBits
+from extractor.numbering.code_bits import Agreement, CodeBits
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
     ATTACHMENT,
-    CODE_WITNESSES,
     WHITE,
     WITNESSES,
     AttachmentLimits,
@@ -47,16 +48,18 @@ ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a 
 
 
 class RegisteredLayout(NamedTuple):
-    """The layout as native loops take it.
+    """The layouts of a family as native loops take them.
 
     Attributes:
         axial: (U, 2) int32, of the colored cells.
-        white_axial: (W, 2) int32, of the white down-cells.
+        white_axial: (W, 2) int32, of the white down-cells of all pads.
+        white_pad: (W,) int32, the pad of each, in ascending order.
         cell_lookup: (S, S) int32, as ``Lattice.cell_lookup``.
     """
 
     axial: NDArray[np.int32]
     white_axial: NDArray[np.int32]
+    white_pad: NDArray[np.int32]
     cell_lookup: NDArray[np.int32]
 
 
@@ -65,13 +68,31 @@ class Motions(NamedTuple):
 
     Attributes:
         motion: (K, 3) int32, turn, and shifts of q and r.
+        pad: (K,) int32, the pad of a family.
         score: (K,) float64, log odds.
         white: (K,) float64, the log odds of the white places alone.
+        known_white: (K,) int32, the number of the known ones of these.
+        rival_without_white: the best score of all motions of the part but the first, without their white places.
+        compared: number of all motions of the part.
     """
 
     motion: NDArray[np.int32]
+    pad: NDArray[np.int32]
     score: NDArray[np.float64]
     white: NDArray[np.float64]
+    known_white: NDArray[np.int32]
+    rival_without_white: float
+    compared: int
+
+    def chosen(self, order: NDArray[np.intp], score: NDArray[np.float64]) -> Motions:
+        """Some of the motions, with other scores."""
+        return self._replace(
+            motion=self.motion[order],
+            pad=self.pad[order],
+            score=score,
+            white=self.white[order],
+            known_white=self.known_white[order],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +101,7 @@ class Numbering:
 
     Attributes:
         cell: (N,) int32, the layout's cell of each cell of the image, or -1.
+        pad: number of the pad in its family.
         mirrored: the pattern is seen from its back.
         origin: the evidence for the origin.
         lead: log odds of the motion of the first part over the second best.
@@ -88,6 +110,7 @@ class Numbering:
     """
 
     cell: NDArray[np.int32]
+    pad: int
     mirrored: bool
     origin: Origin
     lead: float
@@ -174,41 +197,57 @@ class PlacedPart(NamedTuple):
 
     @property
     def is_certain(self) -> bool:
-        if len(self.motions.score) == 0 or self.lead < LEAD or not self.is_code:
+        if len(self.motions.score) == 0 or self.lead < LEAD:
             return False
-        return self.bits is None or self.is_proved_by_bits or self.lead_without_bits >= LEAD
+        return (
+            self.bits is None or self.is_proved_by_bits or (self.lead_without_bits >= LEAD and self.is_code)
+        )
 
     @property
     def is_code(self) -> bool:
-        """Whether the best motion shows the code of the layout, if it has one."""
-        return self.bits is None or self.bits.is_code(float(self.motions.white[0]))
+        """Whether the best motion, if it is right, shows the code of the layout, if the layout has one."""
+        return self.bits is None or self.bits.proves(self.agreement._replace(motions=1), lead=0.0)
+
+    def has_motion_of(self, other: PlacedPart) -> bool:
+        """Whether the best motions of both agree."""
+        own, others = self.motions, other.motions
+        return bool(own.pad[0] == others.pad[0] and (own.motion[0] == others.motion[0]).all())
 
     @property
     def is_proved_by_bits(self) -> bool:
-        return self.bits is not None and self.lead >= self.bits.min_lead
+        return self.bits is not None and self.bits.proves(self.agreement, self.lead)
+
+    @property
+    def agreement(self) -> Agreement:
+        """Of the best motion."""
+        motions = self.motions
+        return Agreement(float(motions.white[0]), int(motions.known_white[0]), motions.compared)
 
     @property
     def lead_without_bits(self) -> float:
         """Log odds of the best motion over the others by all witnesses but the bits."""
-        scores = self.motions.score - self.motions.white
-        return float(scores[0] - scores[1:].max(initial=-np.inf))
+        motions = self.motions
+        return float(motions.score[0] - motions.white[0]) - motions.rival_without_white
 
 
 class Registration:
-    """Registers the cells of images with one layout.
+    """Registers the cells of images with the layouts of one family.
 
     Args:
-        lattice: the layout.
-        palette: its inks.
+        lattices: the layouts, which differ in their white cells alone.
+        palette: their inks.
         mirrored: whether images show the back; None where both sides are read.
     """
 
-    def __init__(self, lattice: Lattice, palette: Palette, mirrored: bool | None) -> None:
-        self._lattice = lattice
+    def __init__(self, lattices: Sequence[Lattice], palette: Palette, mirrored: bool | None) -> None:
+        self._lattice = lattice = lattices[0]
         self._palette = palette
         self._mirrored = mirrored
-        self._layout = RegisteredLayout(lattice.axial, lattice.white_axial, lattice.cell_lookup)
-        self._is_coded = len(lattice.white_axial) > 1
+        whites = [one.white_axial for one in lattices]
+        white_pad = np.repeat(np.arange(len(whites), dtype=np.int32), [len(one) for one in whites])
+        self._layout = RegisteredLayout(lattice.axial, np.concatenate(whites), white_pad, lattice.cell_lookup)
+        self._is_family = len(lattices) > 1
+        self._is_coded = len(whites[0]) > 1
         self.min_cells = max(MIN_LAYOUT_SHARE * len(lattice.ink), min(MIN_CELLS, len(lattice.ink)))
 
     def number(
@@ -275,10 +314,8 @@ class Registration:
         fields = seen.fields
         axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
         bits = CodeBits.of(fields, axial) if self._is_coded else None
-        white, limits = (
-            (bright.white_odds(fields), WITNESSES) if bits is None else (bits.odds, CODE_WITNESSES)
-        )
-        found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, limits)
+        white = bright.white_odds(fields) if bits is None else bits.odds
+        found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, WITNESSES)
         motions = Motions(*found)
         white_axial = fields.down_axial[fields.is_triangle]
         return PlacedPart(seen, motions, white_axial, self._other_whites(white_axial, motions), bits)
@@ -311,14 +348,16 @@ class Registration:
         """
         if not 1 < count <= MAX_TIED:
             return []
-        parts = ATTACHMENT._replace(with_single_cells=False)
-        counts = np.array([np.count_nonzero(self._placed_cells(placed, k, parts) >= 0) for k in range(count)])
-        score = placed.motions.score[:count] + WITNESSES.outside_weight * counts
+        parts, motions = ATTACHMENT._replace(with_single_cells=False), placed.motions
+        # the pads of a family have the same cells at the same places
+        _, first, same = np.unique(motions.motion[:count], axis=0, return_index=True, return_inverse=True)
+        counts = [np.count_nonzero(self._placed_cells(placed, int(k), parts) >= 0) for k in first]
+        score = motions.score[:count] + WITNESSES.outside_weight * np.array(counts)[same.reshape(-1)]
         order = np.argsort(-score, kind="stable")
-        motions = placed.motions
-        chosen = Motions(motions.motion[order], score[order], motions.white[order])
+        chosen = motions.chosen(order, score[order])
         decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
-        return [decided] if decided.lead >= JOINT_LEAD and decided.is_code else []
+        is_certain = decided.lead >= JOINT_LEAD and (not self._is_family or decided.is_proved_by_bits)
+        return [decided] if is_certain and decided.is_code else []
 
     def _placed_cells(
         self, placed: PlacedPart, number: int, limits: AttachmentLimits = ATTACHMENT
@@ -353,14 +392,22 @@ class Registration:
         if numbered < MIN_NUMBERED_SHARE * count:
             first = next(one for one in parts if one.seen.part == placed.seen.part)
             again = self._with_all_parts(first, len(first.motions.score))
-            if not again or (again[0].motions.motion[0] != placed.motions.motion[0]).any():
+            if not again or not again[0].has_motion_of(placed):
                 return None
         others = [one for one, own in zip(parts, sizes, strict=True) if own[1] == 0]
         if any(one.is_certain and one.motions.white[0] > 0.0 for one in others):
             return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
         white = float(placed.motions.white[0])
         misfit = 0.0 if placed.bits is None else placed.bits.misfit(white)
-        return Numbering(cell, placed.seen.mirrored, _origin(placed), placed.lead, placed.seen.fields, misfit)
+        return Numbering(
+            cell,
+            int(placed.motions.pad[0]),
+            placed.seen.mirrored,
+            _origin(placed),
+            placed.lead,
+            placed.seen.fields,
+            misfit,
+        )
 
 
 def _origin(placed: PlacedPart) -> Origin:
@@ -381,8 +428,8 @@ def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bo
 def _uncertain_reason(placed: PlacedPart) -> Reason:
     """Why a part has no certain motion."""
     if placed.bits is not None:
-        known = len(placed.motions.score) > 0 and placed.bits.is_known
-        return Reason.OTHER_CODE if known and not placed.is_code else Reason.AMBIGUOUS
+        is_other = len(placed.motions.score) > 0 and placed.bits.is_other(placed.agreement)
+        return Reason.OTHER_CODE if is_other else Reason.AMBIGUOUS
     white = placed.motions.white
     close = placed.tied
     whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites

@@ -98,7 +98,6 @@ class AttachmentLimits(NamedTuple):
 
 
 WITNESSES = WitnessLimits()
-CODE_WITNESSES = WITNESSES._replace(max_motions=10_000)  # all: bits have no part in one of the leads
 WHITE = WhiteLimits()
 ATTACHMENT = AttachmentLimits()
 

@@ -26,8 +26,8 @@ PIPELINE = (
         "regions are grown by AGA where the first look misses cells",
         "accuracy",
         "extractor/pipeline.py",
-        "if effort is not EFFORTS[0]:",
-        "if False:",
+        "if before is not None:\n            cells = stages",
+        "if False:\n            cells = stages",
     ),
     Rule(
         "finer scale",
@@ -53,8 +53,8 @@ CELLS = (
         "cells are sought at several levels of the contrast",
         "accuracy",
         "extractor/cells/cells.py",
-        "[0.32, 0.5, 0.65])),\n    Effort(7, np.array([0.2, 0.42, 0.75]))",
-        "[0.5])),\n    Effort(7, np.array([0.5]))",
+        "[0.32, 0.5, 0.65])),\n    Effort(np.arange(7), np.array([0.2, 0.42, 0.75]))",
+        "[0.5])),\n    Effort(np.arange(7), np.array([0.5]))",
     ),
     Rule(
         "contrast over noise",

@@ -5,9 +5,10 @@ An image that shows the code of a print sheet is judged as a print: layout, scal
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -31,6 +32,7 @@ from cmpdesign.cli.terminal import (
     printable_path,
     say_text,
 )
+from cmpdesign.errors import InputError, parameter
 from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
@@ -46,12 +48,20 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "cmpdesign verify layout.json sample.png -o checked",
     'cmpdesign verify layout.json frames "more/*.png" --json',
+    "cmpdesign verify pad-1.json pad-2.json sample.png",
 )
 EXIT_NOT_VERIFIED = 1
 
 
 def verify(
-    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
+    layout: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LAYOUT...",
+            help="The pattern's layout.json; or those of several pads with different codes: pictures show any "
+            "one of them.",
+        ),
+    ],
     images: SourcesArgument,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
@@ -102,22 +112,27 @@ def verify(
     from cmpdesign.inputs.sources import name_sources
     from cmpdesign.tracking.source_images import count_images, source_images
     from cmpdesign.tracking.sources import Reading
-    from extractor import load_layout
+    from extractor.layout.layout_file import layouts_of
 
     require_suffix("--report", report, [".zip"])
-    reference, known = load_layout(layout), parse_reading_response(response)
-    judge = Verifier(reference, min_share, known, channels, sheet_dpi, max_pixels, preset)
+    layouts = [layout, *(Path(text) for text in takewhile(_is_layout, images))]
+    if report is not None and len(layouts) > 1:
+        raise InputError(
+            f"{parameter('report')} bundles one layout, and {len(layouts)} are given; give the pad's"
+        )
+    family, known = layouts_of(layouts), parse_reading_response(response)
+    judge = Verifier(family, min_share, known, channels, sheet_dpi, max_pixels, preset)
     bundle = None
     if report is not None:
         bundle = _new_report(layout, _Settings(preset, response, channels, min_share))
     verifier = _ImageVerifier(judge, _Folders(output, debug), bundle)
-    sources = name_sources(images)
+    sources = name_sources(images[len(layouts) - 1 :])
     outcomes = []
     with progress_bar("verifying", count_images(sources, frames), unit="pictures") as advance:
         for image in source_images(sources, frames, Reading(max_pixels=max_pixels, bits=bits)):
             outcomes.append(verifier.verify_image(image))
             advance("")
-    document = _to_document(reference, outcomes, min_share)
+    document = _to_document(family, outcomes, min_share)
     if output is not None:
         from cmpdesign.files.atomic import write_file
 
@@ -129,6 +144,11 @@ def verify(
     if report is not None:
         say_text(f"wrote {printable_path(report)}\n")
     finish(lambda: document, max(outcome.exit_code for outcome in outcomes))
+
+
+def _is_layout(text: str) -> bool:
+    """Whether a text beside the pictures names a layout file; no picture or video ends so."""
+    return text.lower().endswith(".json")
 
 
 class _Folders(NamedTuple):
@@ -209,7 +229,7 @@ class _ImageVerifier:
 
         stages: Mapping[str, Image] = {}
         if isinstance(verdict, Verdict):
-            reference = self.judge.reference
+            reference = self.judge.extractor.layout_of(verdict.markers)
             _write_pictures(image, reference, verdict, source.stem, self.folders)
             if self.bundle is not None:
                 from extractor.draw import draw_stages
@@ -245,7 +265,10 @@ def _format_verdict(verdict: Verdict | SheetVerdict) -> str:
     if not isinstance(verdict, Verdict):
         return verdict.line()
     repaired = verdict.repaired + verdict.fitted
-    counts = f"{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
+    pad = "" if verdict.markers.code is None else f"pad {verdict.markers.code}, "
+    counts = (
+        f"{pad}{verdict.measured} of {verdict.present} measured, {repaired} repaired, {verdict.lost} lost"
+    )
     head = "verified" if verdict.verified else f"not verified: {verdict.reason}"
     line = f"{head} ({counts}, {sum(verdict.markers.timings_ms.values()):.1f} ms)"
     quality = verdict.markers.quality
@@ -253,9 +276,10 @@ def _format_verdict(verdict: Verdict | SheetVerdict) -> str:
     return "".join([line, *(f"\n  {hint}" for hint in hints if hint not in head)])
 
 
-def _to_document(reference: Reference, outcomes: list[Outcome], min_share: float) -> VerifyDocument:
+def _to_document(family: Sequence[Reference], outcomes: list[Outcome], min_share: float) -> VerifyDocument:
     from cmpdesign.documents.reading import ImagePart, VerifyDocument
 
+    reference, codes = family[0], tuple(one.code.id for one in family if one.code is not None)
     return VerifyDocument(
         format="cmp-verification",
         version=1,
@@ -264,4 +288,5 @@ def _to_document(reference: Reference, outcomes: list[Outcome], min_share: float
         min_share=min_share,
         verified=all(outcome.exit_code == 0 for outcome in outcomes),
         images=tuple(ImagePart(**outcome.fields) for outcome in outcomes),
+        **({"codes": codes} if len(family) > 1 else {}),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,20 +61,22 @@ class SheetVerdict:
         return f"{head} (print sheet {reading.key.name}, {scale}, skew {reading.skew_deg:+.3f} deg{note})"
 
 
-def judge_sheet(image: Image, path: Path | None, digest: str, dpi: float | None = None) -> SheetVerdict:
+def judge_sheet(
+    image: Image, path: Path | None, digests: Collection[str], dpi: float | None = None
+) -> SheetVerdict:
     """Judge a picture of a print sheet.
 
     Args:
         image: (H, W, 3) BGR, uint8 or uint16.
         path: the picture's file, which may state the resolution; None without a file of its own.
-        digest: digest of the layout.
+        digests: digests of the layouts of which the sheet may be.
         dpi: resolution instead of the file's; 0: unknown, the file's resolution is ignored.
     """
     bars = find_sheet_bars(image)
     if isinstance(bars, str):
         return SheetVerdict(False, bars, None, None)
     reading, note = _measure_with_resolution(bars, path, dpi)
-    reason = _failure_reason(reading, digest)
+    reason = _failure_reason(reading, digests)
     return SheetVerdict(reason is None, reason, note, reading)
 
 
@@ -97,9 +100,9 @@ def _measure_with_resolution(
     return measure_sheet(bars), f"scales not known, only their ratio: {resolution}"
 
 
-def _failure_reason(reading: SheetReading, digest: str) -> str | None:
+def _failure_reason(reading: SheetReading, digests: Collection[str]) -> str | None:
     """One sentence on the first failed test; None if the sheet passes all tests."""
-    if reading.key.digest != digest:
+    if reading.key.digest not in digests:
         return f"the sheet is of another layout ({reading.key.name}, digest {reading.key.digest[:12]})"
     if reading.perspective_mm > PERSPECTIVE_TOLERANCE_MM:
         return (

@@ -10,7 +10,7 @@
 namespace cmp::cells {
 
 void add_cells(nb::module_ module) {
-  bind<&find_candidates>(module, "find_candidates", {"image", "count", "shares", "known", "tile_px"});
+  bind<&find_candidates>(module, "find_candidates", {"image", "maps", "shares", "known", "tile_px"});
   bind<&grow>(module, "grow", {"hsv", "seed_xy", "limit_px"});
   bind<&fit_to_moments>(module, "fit_to_moments", {"moments", "seed"});
   bind<&update_triangle_corners>(module, "update_triangle_corners", {"view", "corners", "good"});

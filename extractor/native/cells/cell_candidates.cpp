@@ -66,15 +66,15 @@ double own_share(const image::ContrastMap& map, const MomentShape& shape, double
 }
 
 // The triangles of some maps at some levels.
-std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index count,
+std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
                                      View<const double, 1> shares, Index tile_px,
                                      const CandidateLimits& limits) {
   std::vector<Candidate> all;
   const auto channels = image::smoothed_channels(image);
   const double least = limits.min_contrast_deviations * std::max(image::smoothed_noise(channels), 0.3);
   const double most = limits.max_area_share * static_cast<double>(image.size(0) * image.size(1));
-  for (Index k = 0; k < count; ++k) {
-    const auto map = image::contrast_map(channels, k, tile_px);
+  for (const std::int64_t number : maps) {
+    const auto map = image::contrast_map(channels, number, tile_px);
     for (const double share : shares)
       for (const MomentSums& sums : level_regions(map, share, least, limits.min_area_px, most)) {
         const MomentShape shape = shape_of(sums);
@@ -92,9 +92,10 @@ std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, Index co
 
 }  // namespace
 
-FoundCells find_candidates(View<const std::uint8_t, 3> image, Index count, View<const double, 1> shares,
-                           const KnownCells& known, Index tile_px, const CandidateLimits& limits) {
-  std::vector<Candidate> all = candidates_of(image, count, shares, tile_px, limits);
+FoundCells find_candidates(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
+                           View<const double, 1> shares, const KnownCells& known, Index tile_px,
+                           const CandidateLimits& limits) {
+  std::vector<Candidate> all = candidates_of(image, maps, shares, tile_px, limits);
   for (Index i = 0; i < known.area_px.size(); ++i) {
     Candidate one{known.center_px(i, 0), known.center_px(i, 1), known.area_px[i],
                   known.quality[i],      known.share[i],        {}};

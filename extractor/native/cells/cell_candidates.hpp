@@ -39,10 +39,11 @@ struct KnownCells {
   CMP_RECORD("extractor.cells.cells.Cells", center_px, area_px, corner_px, quality, share)
 };
 
-// Cells of the image (H, W, 3), by the first `count` contrast maps at some shares of the local contrast, and
+// Cells of the image (H, W, 3), by some of the contrast maps at some shares of the local contrast, and
 // by those that were found before; of several at one place the one with the best shape. tile_px: of the tiles
 // of local levels.
-FoundCells find_candidates(View<const std::uint8_t, 3> image, Index count, View<const double, 1> shares,
-                           const KnownCells& known, Index tile_px, const CandidateLimits& limits);
+FoundCells find_candidates(View<const std::uint8_t, 3> image, View<const std::int64_t, 1> maps,
+                           View<const double, 1> shares, const KnownCells& known, Index tile_px,
+                           const CandidateLimits& limits);
 
 }  // namespace cmp::cells

@@ -16,6 +16,7 @@ void add_numbering(nb::module_ module) {
   bind<&ink_fields>(module, "ink_fields", {"view", "cells", "light", "part", "limits"});
   bind<&register_part>(module, "register_part",
                        {"axial", "naming", "white_axial", "white", "layout", "limits"});
+  bind<&cells_beside>(module, "cells_beside", {"axial", "down_axial"});
   bind<&moved_cells>(module, "moved_cells", {"axial", "turn", "dq", "dr", "cell_lookup"});
   bind<&attach_parts>(module, "attach_parts",
                       {"cells", "cell", "odds", "layout", "axial", "cell_lookup", "limits"});

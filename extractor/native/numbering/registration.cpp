@@ -1,6 +1,9 @@
 #include "numbering/registration.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "layout/lattice_tables.hpp"
@@ -28,15 +31,17 @@ Extent trimmed_extent(const std::vector<AxialStep>& places, int axis, double sha
 }
 
 struct ScoredMotion {
+  std::int32_t pad;
   Motion motion;
   double score;
   double white;
+  std::int32_t known;  // of its white places
 };
 
-// The log odds of white over black by axial place.
-class WhitePlaces {
+// The numbers of axial places.
+class AxialPlaces {
  public:
-  WhitePlaces(View<const std::int32_t, 2> axial, View<const double, 1> odds) : odds_(odds) {
+  explicit AxialPlaces(View<const std::int32_t, 2> axial) {
     for (Index n = 0; n < axial.size(); ++n) {
       const std::int32_t reach = std::max(std::abs(axial(n, 0)), std::abs(axial(n, 1)));
       reach_ = std::max(reach_, reach);
@@ -45,14 +50,12 @@ class WhitePlaces {
     for (Index n = 0; n < axial.size(); ++n)
       lookup_(axial(n, 0) + reach_, axial(n, 1) + reach_) = static_cast<std::int32_t>(n);
   }
-  double at(AxialStep a) const {
-    if (std::abs(a.q) > reach_ || std::abs(a.r) > reach_) return 0.0;
-    const std::int32_t n = lookup_(a.q + reach_, a.r + reach_);
-    return n < 0 || std::isnan(odds_[n]) ? 0.0 : odds_[n];
+  std::int32_t number_at(AxialStep a) const {
+    if (std::abs(a.q) > reach_ || std::abs(a.r) > reach_) return -1;
+    return lookup_(a.q + reach_, a.r + reach_);
   }
 
  private:
-  View<const double, 1> odds_;
   std::int32_t reach_ = 0;
   Array<std::int32_t, 2> lookup_;
 };
@@ -66,12 +69,40 @@ std::int64_t count_inside(const std::vector<AxialStep>& places, std::int32_t dq,
   return static_cast<std::int64_t>(places.size()) - outside;
 }
 
+// The best motions, the best first; of equal ones the first.
+Motions best_motions(std::vector<ScoredMotion> found, Index most) {
+  const Index count = std::min<Index>(static_cast<Index>(found.size()), most);
+  std::vector<Index> order(found.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::partial_sort(order.begin(), order.begin() + count, order.end(), [&](Index a, Index b) {
+    return found[a].score > found[b].score || (found[a].score == found[b].score && a < b);
+  });
+  Array<std::int32_t, 2> motions({count, 3});
+  Array<std::int32_t, 1> pads({count}), known({count});
+  Array<double, 1> scores({count}), odds({count});
+  for (Index k = 0; k < count; ++k) {
+    const ScoredMotion& one = found[order[k]];
+    motions(k, 0) = one.motion.turn, motions(k, 1) = one.motion.dq, motions(k, 2) = one.motion.dr;
+    pads[k] = one.pad, scores[k] = one.score, odds[k] = one.white, known[k] = one.known;
+  }
+  double without_white = -std::numeric_limits<double>::infinity();
+  for (std::size_t n = 1; n < order.size(); ++n)
+    without_white = std::max(without_white, found[order[n]].score - found[order[n]].white);
+  return {std::move(motions),
+          std::move(pads),
+          std::move(scores),
+          std::move(odds),
+          std::move(known),
+          without_white,
+          static_cast<Index>(found.size())};
+}
+
 }  // namespace
 
 Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> naming,
                       View<const std::int32_t, 2> white_axial, View<const double, 1> white,
                       const RegisteredLayout& layout, const WitnessLimits& limits) {
-  const WhitePlaces whites(white_axial, white);
+  const AxialPlaces places(white_axial);
   const auto most =
       std::max(limits.min_outside,
                static_cast<std::int64_t>(limits.max_outside_share * static_cast<double>(axial.size())));
@@ -82,6 +113,9 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
   std::array<Extent, 3> allowed;
   for (int axis = 0; axis < 3; ++axis) allowed[axis] = trimmed_extent(of_layout, axis, 0.0);
   std::vector<ScoredMotion> found;
+  const std::int32_t pads = layout.white_pad[layout.white_pad.size() - 1] + 1;
+  std::vector<double> odds(pads);
+  std::vector<std::int32_t> known(pads);
   for (std::int32_t turn = 0; turn < TURNS; ++turn) {
     std::vector<AxialStep> turned;
     for (const AxialStep& a : cells) turned.push_back(turned_up(a, turn));
@@ -93,26 +127,34 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
         const std::int64_t inside = count_inside(turned, dq, dr, most, layout.cell_lookup);
         if (inside < 0) continue;
         const Motion motion{turn, dq, dr};
-        double odds = 0.0;
-        for (Index w = 0; w < layout.white_axial.size(); ++w)
-          odds += whites.at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
+        std::fill(odds.begin(), odds.end(), 0.0);
+        std::fill(known.begin(), known.end(), 0);
+        for (Index w = 0; w < layout.white_axial.size(); ++w) {
+          const std::int32_t place =
+              places.number_at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
+          if (place < 0 || std::isnan(white[place])) continue;
+          odds[layout.white_pad[w]] += white[place], ++known[layout.white_pad[w]];
+        }
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
-        const double outside = static_cast<double>(axial.size() - inside);
-        found.push_back(
-            {motion, naming[((shift % 3) + 3) % 3] + odds - limits.outside_weight * outside, odds});
+        const double others = naming[((shift % 3) + 3) % 3] -
+                              limits.outside_weight * static_cast<double>(axial.size() - inside);
+        for (std::int32_t pad = 0; pad < pads; ++pad)
+          found.push_back({pad, motion, others + odds[pad], odds[pad], known[pad]});
       }
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const ScoredMotion& a, const ScoredMotion& b) { return a.score > b.score; });
-  const Index count = std::min<Index>(static_cast<Index>(found.size()), limits.max_motions);
-  Array<std::int32_t, 2> motions({count, 3});
-  Array<double, 1> scores({count}), odds({count});
-  for (Index k = 0; k < count; ++k) {
-    motions(k, 0) = found[k].motion.turn, motions(k, 1) = found[k].motion.dq,
-               motions(k, 2) = found[k].motion.dr;
-    scores[k] = found[k].score, odds[k] = found[k].white;
+  return best_motions(std::move(found), limits.max_motions);
+}
+
+Array<std::int32_t, 1> cells_beside(View<const std::int32_t, 2> axial,
+                                    View<const std::int32_t, 2> down_axial) {
+  const AxialPlaces cells(axial);
+  Array<std::int32_t, 1> out({down_axial.size()}, 0);
+  for (Index n = 0; n < down_axial.size(); ++n) {
+    const std::int32_t q = down_axial(n, 0), r = down_axial(n, 1);
+    for (const AxialStep beside : {AxialStep{q, r}, {q - 1, r}, {q - 1, r + 1}})
+      if (cells.number_at(beside) >= 0) ++out[n];
   }
-  return {std::move(motions), std::move(scores), std::move(odds)};
+  return out;
 }
 
 Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,

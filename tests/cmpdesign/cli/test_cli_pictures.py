@@ -305,3 +305,24 @@ def test_verify_shows_the_quality_of_a_picture(made: Path, tmp_path: Path) -> No
     quality = report["images"][0]["quality"]
     assert quality["hints"] == [] and quality["clipping"] == 0 and 20 < quality["edge_px"] < 30
     assert 0.5 < quality["blur_px"] < 2 and 1 < quality["noise"] < 3 and len(quality["weakest_inks"]) == 2
+
+
+def test_verify_takes_the_layouts_of_a_family(tmp_path: Path) -> None:
+    for code in (1, 2, 3):
+        layout = tmp_path / str(code)
+        design = ("honeycomb", "--set", "layers=7", "--set", f"code={code}")
+        assert run("build", *design, "-o", layout, "--only", "layout").exit_code == 0
+    layouts = [tmp_path / str(code) / "layout.json" for code in (1, 2)]
+    pictures = [tmp_path / f"{code}.png" for code in (2, 3)]
+    for code, picture in zip((2, 3), pictures, strict=True):
+        layout = tmp_path / str(code) / "layout.json"
+        assert run("render", layout, "-o", picture, "--pitch", "20", "--size", "400x340").exit_code == 0
+    result = run("verify", *layouts, pictures[0])
+    assert result.exit_code == 0 and "verified (pad 2, " in result.stdout
+    document = json.loads(run("verify", *layouts, *pictures, "--json").stdout)
+    assert document["codes"] == [1, 2]
+    own, other = document["images"]
+    assert own["verified"] and own["code"] == 2
+    assert not other["verified"] and "code" not in other and "white cells" in other["reason"]
+    error = refused("verify", *layouts, pictures[0], "--report", tmp_path / "report.zip")
+    assert "--report bundles one layout, and 2 are given" in error

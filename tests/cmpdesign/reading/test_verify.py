@@ -36,7 +36,7 @@ def test_the_truth_is_verified(pitch_px: float, noise: float, light: str) -> Non
 
 
 def test_what_the_extractor_finds_is_verified() -> None:
-    verdict = verify(Extractor(reference()), reference(), picture().image)
+    verdict = verify(Extractor(reference()), picture().image)
     assert verdict.verified and verdict.measured == 61
     assert verdict.to_json()["timings_ms"].keys() == verdict.markers.timings_ms.keys()
 
@@ -76,10 +76,10 @@ def test_the_other_side_is_found_out() -> None:
     image = picture(mirrored=True).image
     either = Extractor(reference(), side="either")
     seen = "the pattern is seen from the back, but designed to be seen from the front"
-    assert verify(either, reference(), image).reason == (
+    assert verify(either, image).reason == (
         f"{seen}: a mirrored camera or the pad's other face, by the colors of the inks"
     )
-    assert "red and blue are swapped" in str(verify(either, reference(), image[:, ::-1, ::-1]).reason)
+    assert "red and blue are swapped" in str(verify(either, image[:, ::-1, ::-1]).reason)
 
 
 @pytest.mark.parametrize(("lost", "verified"), [(6, True), (7, False)])
@@ -111,14 +111,14 @@ def test_nothing_found_has_a_sentence(reason: Reason | None) -> None:
 
 @pytest.mark.parametrize("make", [np.zeros_like, lambda image: image[::-1, ::-1] * 0 + 127])
 def test_pictures_without_a_pattern(make: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> None:
-    verdict = verify(Extractor(reference()), reference(), make(picture().image))
+    verdict = verify(Extractor(reference()), make(picture().image))
     assert not verdict.verified and verdict.share == 0
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
 def test_a_share_is_a_share(share: float) -> None:
     with pytest.raises(CmpDesignError, match="min_share"):
-        verify(Extractor(reference()), reference(), picture().image, min_share=share)
+        verify(Extractor(reference()), picture().image, min_share=share)
 
 
 @pytest.mark.parametrize("pattern", ["honeycomb", "round", "elliptical"])
@@ -129,7 +129,7 @@ def test_a_pattern_of_other_layers_is_named(pattern: str, seen: int, given: int)
     """
     image = render(Scene(layout=small_layout(pattern, seen), camera=Camera(30, 7)), size=(480, 400)).image
     layout = parse_layout(small_text("honeycomb", given))
-    verdict = verify(Extractor(layout), layout, image)
+    verdict = verify(Extractor(layout), image)
     assert not verdict.verified
     assert f"does not fit the layout: it has {seen} layers, the layout {given};" in str(verdict.reason)
 
@@ -138,4 +138,4 @@ def test_a_part_of_the_pattern_is_not_taken_for_another() -> None:
     """The picture ends before the pattern does, so its layers cannot be counted."""
     image = render(Scene(layout=small_layout("honeycomb", 5), camera=Camera(30, 7)), size=(320, 240)).image
     layout = parse_layout(small_text("honeycomb", 5))
-    assert "markers measured" in str(verify(Extractor(layout), layout, image).reason)
+    assert "markers measured" in str(verify(Extractor(layout), image).reason)

@@ -7,11 +7,10 @@ import pytest
 
 from benchmarks.pad_codes.parts import (
     NO_BRIGHT_PLACES,
-    STEPS_BESIDE,
     Pad,
-    down_cells_of,
     is_right,
     measured,
+    moved,
     pad_of,
     random_motion,
     seen_part,
@@ -33,10 +32,11 @@ def require_every_window_placed(pad: Pad, radius: int) -> None:
         inside = (np.abs(corners).max(axis=(1, 2)) <= radius) & (
             np.abs(corners.sum(axis=2)).max(axis=1) <= radius
         )
-        beside = (pad.down[inside][:, None] + STEPS_BESIDE).reshape(-1, 2)
-        places = axial[(axial[:, None] == beside).all(axis=2).any(axis=1)]
-        near = down_cells_of(pad, places) & inside
-        seen = seen_part(places, pad.down[near], pad.is_white[near].astype(float), random_motion(rng))
+        part = np.isin(np.arange(len(axial)), pad.beside[inside])
+        places, near = axial[part], pad.down_cells_of(part) & inside
+        motion = random_motion(rng)
+        frame = moved(places, motion, up=True), moved(pad.down[near], motion, up=False)
+        seen = seen_part(places, *frame, pad.is_white[near].astype(float))
         placed = pad.registration.register(seen, NO_BRIGHT_PLACES)
         assert placed.is_certain and placed.is_proved_by_bits and is_right(placed, places), center
 
@@ -52,7 +52,7 @@ def test_every_window_of_every_code_has_its_place(code: int) -> None:
 
 
 def require_none_wrong(layers: int, parts: int, seed: int) -> None:
-    counts, _ = measured(layers, parts, seed)
+    counts = measured(layers, parts, seed)
     assert sum(one["wrong"] for one in counts.values()) == 0
     assert counts["120 and more"]["right"] > 0.3 * counts["120 and more"].total()
 

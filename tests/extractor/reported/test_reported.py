@@ -34,7 +34,7 @@ def verdicts(case: Path) -> dict[str, Verdict]:
     for name in told["expected"]:
         image = read_image(case / name)
         swapped = image[:, :, ::-1].copy() if settings["channels"] == "rgb" else image
-        found[name] = verify(extractor, reference, swapped, settings["min_share"])
+        found[name] = verify(extractor, swapped, settings["min_share"])
     return found
 
 
