@@ -158,7 +158,7 @@ def test_scatter_bends_gridlines_as_random_markers_do(pattern: str) -> None:
 
 
 def lone(
-    xy: NDArray[np.float64], near: NDNDArray[np.float64][np.int32], offset: NDArray[np.float64], m: int
+    xy: NDArray[np.float64], near: NDArray[np.int32], offset: NDArray[np.float64], m: int
 ) -> NDArray[np.float64]:
     """(2, 5) the derivatives at one marker by numpy."""
     known = [k for k, n in enumerate(near[m]) if n >= 0 and np.isfinite(xy[n, 0])]
