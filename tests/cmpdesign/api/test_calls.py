@@ -122,7 +122,7 @@ def test_the_reader_takes_every_form_of_a_layout(
     assert json.loads(path.read_text(encoding="utf-8")) == design.layout.to_dict()
 
 
-@pytest.mark.parametrize("given", [None, 3, ["layout.json"], b"layout.json", object()])
+@pytest.mark.parametrize("given", [None, 3, {"layout.json"}, b"layout.json", object()])
 def test_the_reader_says_what_it_takes(given: object) -> None:
     with pytest.raises(TypeError, match=r"layout is a value of the type .*; give the path"):
         Extractor(given)  # type: ignore[arg-type]
