@@ -66,8 +66,6 @@ THRESHOLDS = {
     "max_distance": Threshold(
         "extractor/complete/consistency_filter.py", "max_distance", (0.06, 0.1, 0.25, 0.4, 1.0)
     ),
-    "max_deviation": Threshold("extractor/refine/acceptance.py", "max_deviation", (0.01, 0.02, 0.06, 0.15)),
-    "max_shift": Threshold("extractor/refine/acceptance.py", "max_shift", (0.1, 0.18, 0.4, 0.8)),
 }
 
 
@@ -103,7 +101,7 @@ def measure(
     Args:
         quick: few pictures.
         pictures: of damage.
-        threshold: max_distance, max_deviation or max_shift.
+        threshold: max_distance.
     """
     if threshold not in THRESHOLDS:
         raise OptionError(f"--threshold is {threshold!r}; it must be one of {', '.join(THRESHOLDS)}")

@@ -36,6 +36,6 @@ def test_the_readers_own_value_is_found_in_its_source(name: str) -> None:
 
 def test_a_narrow_threshold_loses_markers(tmp_path: Path) -> None:
     pictures = list(islice(keep_all(2, 4, tmp_path), 2))
-    narrow, own = curve(THRESHOLDS["max_deviation"], (0.0001, 0.03), pictures)
+    narrow, own = curve(THRESHOLDS["max_distance"], (0.001, 0.14), pictures)
     assert narrow.lost > own.lost
     assert narrow.visible == own.visible > 0

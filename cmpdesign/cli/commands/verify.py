@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "cmpdesign verify layout.json sample.png -o checked",
     'cmpdesign verify layout.json frames "more/*.png" --json',
-    "cmpdesign verify pad-1.json pad-2.json sample.png",
 )
 EXIT_NOT_VERIFIED = 1
 
