@@ -183,7 +183,8 @@ def test_two_sensors_are_paired_by_time(folder: Path, plug: Plug, shots: list[An
             offset_ms = 1e3 * (frames.index.taken_s - frames.thumb.taken_s)
             assert frames.offsets_ms == {"thumb": 0.0, "index": pytest.approx(offset_ms)}
             grid = (offset_ms - 10) / 50  # of the exposures; on a busy machine frames are dropped
-            assert abs(grid - round(grid)) < 1e-3
+            # a camera whose first frame came late is known up to its least delay, 5 ms at most
+            assert abs(grid - round(grid)) < 0.1
     assert nearest_places([[0.0, 0.05, 0.1], [0.01, 0.06]]) == [1, 1]
     assert nearest_places([[0.0], []]) is None
 
