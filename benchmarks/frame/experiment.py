@@ -34,6 +34,7 @@ from benchmarks.frame.published import Page, json_text, publish, read_measured
 from benchmarks.frame.table import Table
 from cmpdesign.files.atomic import write_file
 
+INPUT = "folder"  # an argument of this name is given without dashes
 COMMIT = -1  # as a seed: that of the commit's hash
 _MEANING = re.compile(r"^ +(\w+): (.+)$", re.MULTILINE)
 
@@ -139,7 +140,8 @@ class Experiment:
             values = value if isinstance(value, list) else [value]
             if value in (parameter.default, None) or name == "processes":
                 continue
-            words += [option if value is True else f"{option} {_quoted(each)}" for each in values]
+            option = "" if name == INPUT else option
+            words += [option if value is True else f"{option} {_quoted(each)}".strip() for each in values]
         return " ".join(words)
 
     def _parser(self) -> argparse.ArgumentParser:
@@ -188,4 +190,7 @@ def _add_option(parser: argparse.ArgumentParser, parameter: Parameter, kind: Any
         option["choices"] = get_args(kind)
     else:
         option["type"], option["metavar"] = kind, parameter.name.upper()
-    parser.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **option)
+    if parameter.name == INPUT:
+        parser.add_argument(INPUT, nargs="?", **option)
+    else:
+        parser.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **option)

@@ -99,6 +99,6 @@ def test_a_folder_without_pictures_is_one_clear_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
-        main(["--folder", str(tmp_path)])
+        main([str(tmp_path)])
     error = capsys.readouterr().err
     assert "index.json is no index of pictures" in error and "give a folder" in error
