@@ -24,21 +24,11 @@ import numpy as np
 import cmpdesign
 from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.table import Table
-from benchmarks.latency.timed_camera import TimedCamera, in_the_place_of_opencv
+from benchmarks.latency.timed_camera import TimedCamera, in_the_place_of_opencv, write_sensor
 from cmpdesign.scene import Press, render, standard_layout, standard_scene
 
 RATES_HZ, FAST_HZ, SECONDS, QUICK_SECONDS, SETTLED_S = (60.0, 120.0), 400.0, 30.0, 2.0, 1.0
-SIZE, LAYERS, PICTURES = (640, 480), 10, 8
-SENSOR = """\
-layout = "layout.json"
-[[view]]
-name = "camera"
-focal_px = [900.0, 900.0]
-centre_px = [319.5, 239.5]
-[camera]
-source = "{number}"
-fps = {fps}
-"""
+SIZE, FOCAL_PX, LAYERS, PICTURES = (640, 480), 900.0, 10, 8
 LATENCY = {
     "frames/s": ".0f", "results": "d", "p50 ms": ".1f", "p99 ms": ".1f", "worst ms": ".1f", "dropped %": ".1f",
     "unreported": "d",
@@ -58,7 +48,7 @@ def _opened(folder: Path, cameras: list[TimedCamera]) -> Any:
     cv2.VideoCapture = in_the_place_of_opencv(dict(enumerate(cameras)))  # type: ignore[misc,assignment]
     paths = [folder / f"sensor{number}.toml" for number in range(len(cameras))]
     for number, (path, camera) in enumerate(zip(paths, cameras, strict=True)):
-        path.write_text(SENSOR.format(number=number, fps=camera.fps))
+        write_sensor(path, number, camera.fps, FOCAL_PX, SIZE)
     return cmpdesign.open_sensor(*paths)
 
 

@@ -1,15 +1,18 @@
-"""A camera with known exposure times in the place of OpenCV's: it stalls and fails as told."""
+"""A camera with known exposure times in the place of OpenCV's, which stalls and fails as told, and its sensor file."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
+Size = tuple[int, int]
 BUFFERS = 4  # frames that a driver keeps for a slow reader; then the oldest is lost
 
 
@@ -95,8 +98,10 @@ class OpenedCamera:
         """The next frame whose exposure has ended, waited for; False while it is unplugged."""
         camera = self._camera
         while camera is not None and not self._is_released and camera.fault() != "unplugged":
-            ended = int((time.monotonic() - camera.began_s) * camera.fps)
-            self._next = max(self._next, ended - BUFFERS + 1, 0) if self._next >= 0 else ended
+            ended = math.floor(
+                (time.monotonic() - camera.began_s) * camera.fps
+            )  # -1 before the first exposure
+            self._next = max(self._next, ended - BUFFERS + 1) if self._next >= 0 else max(ended, 0)
             if self._next <= ended and camera.fault() != "stall":
                 self._stamp_s = camera.began_s + self._next / camera.fps
                 self._next += 1
@@ -108,6 +113,18 @@ class OpenedCamera:
     def release(self) -> None:
         """Give it back."""
         self._is_released = True
+
+
+def write_sensor(
+    path: Path, source: int | str, fps: float, focal_px: float = 500.0, size: Size = (320, 240)
+) -> None:
+    """A sensor file of one camera, beside its layout.json; pixel (0, 0) is centred at (0, 0)."""
+    centre = [(side - 1) / 2 for side in size]
+    path.write_text(
+        f'layout = "layout.json"\n[[view]]\nname = "camera"\nfocal_px = [{focal_px}, {focal_px}]\n'
+        f'centre_px = {centre}\n[camera]\nsource = "{source}"\nfps = {fps}\n',
+        encoding="utf-8",
+    )
 
 
 def in_the_place_of_opencv(cameras: dict[int, TimedCamera]) -> Callable[..., OpenedCamera]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import complete as native
+from extractor.image.input import image_noise
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.reference import BLACK, COLORS, Reference
 from extractor.quality import UNKNOWN, Quality
@@ -92,16 +93,7 @@ def measure_quality_without_numbers(view: PyramidLevel, edge_px: float) -> Quali
     """
     sampled = view.image[::CLIPPING_STRIDE, ::CLIPPING_STRIDE]
     clipping = float((sampled.max(axis=2) >= native.CLIPPED_VALUE).mean())
-    return replace(UNKNOWN, clipping=clipping, noise=_image_noise(view.image), edge_px=edge_px)
-
-
-def _image_noise(image: NDArray[np.uint8]) -> float:
-    """Standard deviation of the noisiest channel's noise; edges of cells raise the other differences only."""
-    level = image.astype(np.int16)
-    differences = np.abs(level[:-2, :-2] - level[:-2, 2:] - level[2:, :-2] + level[2:, 2:])
-    few = differences[::CLIPPING_STRIDE, ::CLIPPING_STRIDE].reshape(-1, 3)
-    # of four values with the same noise; 30 % of a normal distribution lie within 0.385 deviations
-    return float(np.quantile(few, 0.3, axis=0).max() / (2 * 0.385))
+    return replace(UNKNOWN, clipping=clipping, noise=image_noise(view.image), edge_px=edge_px)
 
 
 def _quality(found: CellFigures, blur_px: float, noise: float, edge_px: float) -> Quality:

@@ -56,6 +56,11 @@ def in_native_order(image: NDArray[Any]) -> NDArray[Any]:
     return image if image.dtype.isnative else image.astype(image.dtype.newbyteorder("="))
 
 
+def image_noise(image: NDArray[np.uint8]) -> float:
+    """Standard deviation of the noisiest channel of an image (H, W, 3), gray levels of 255; needs no pattern."""
+    return native.channel_noise(np.ascontiguousarray(image.transpose(2, 0, 1)))
+
+
 def estimate_noise(image: NDArray[np.uint8], xy: NDArray[np.float64], cells: NDArray[np.int32]) -> float:
     """Standard deviation of a channel's noise in gray levels (Immerkaer 1996, with a median for robustness).
 

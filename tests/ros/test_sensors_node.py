@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_opencv
+from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_opencv, write_sensor
 from cmpdesign.scene import Press
 from tests.support.layouts import small_text
 from tests.support.tracking.scenes import LAYERS, errors, shot
@@ -34,16 +34,6 @@ MESSAGES = {
     "geometry_msgs": ["Vector3", "Wrench", "WrenchStamped"],
     "diagnostic_msgs": ["DiagnosticArray", "DiagnosticStatus", "KeyValue"],
 }
-SENSOR = """\
-layout = "layout.json"
-[[view]]
-name = "camera"
-focal_px = [500.0, 500.0]
-centre_px = [159.5, 119.5]
-[camera]
-source = "0"
-fps = 20.0
-"""
 
 
 class Policy(Enum):
@@ -133,7 +123,7 @@ def ros(monkeypatch: pytest.MonkeyPatch) -> None:
 def node(ros: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """The node over a camera, with what the camera shows."""
     (tmp_path / "layout.json").write_text(small_text("honeycomb", LAYERS), encoding="utf-8")
-    (tmp_path / "thumb.toml").write_text(SENSOR)
+    write_sensor(tmp_path / "thumb.toml", 0, 20.0)
     shown = {"images": [shot(seed=seed).image for seed in range(3)]}
     camera = TimedCamera(lambda number: shown["images"][number % 3], 20.0)
     monkeypatch.setattr(cv2, "VideoCapture", in_the_place_of_opencv({0: camera}))

@@ -32,7 +32,7 @@ PIPELINE = (
     Rule(
         "finer scale",
         "small cells are read at a finer scale",
-        "accuracy",
+        "no wrong id",
         "extractor/pipeline.py",
         "if found.is_small(view):",
         "if False:",

@@ -71,7 +71,7 @@ std::vector<Candidate> candidates_of(View<const std::uint8_t, 3> image, View<con
                                      const CandidateLimits& limits) {
   std::vector<Candidate> all;
   const auto channels = image::smoothed_channels(image);
-  const double least = limits.min_contrast_deviations * std::max(image::smoothed_noise(channels), 0.3);
+  const double least = limits.min_contrast_deviations * std::max(image::channel_noise(channels), 0.3);
   const double most = limits.max_area_share * static_cast<double>(image.size(0) * image.size(1));
   for (const std::int64_t number : maps) {
     const auto map = image::contrast_map(channels, number, tile_px);

@@ -1,6 +1,7 @@
 #include "image/contrast_maps.hpp"
 
 #include <cmath>
+#include <functional>
 
 #include "base/processor.hpp"
 
@@ -24,7 +25,6 @@ constexpr std::array<Mix, CONTRAST_MAPS> MIXES{{{1, 0, 0, 1, 0},
 constexpr Index NOISE_STRIDE = 3;          // of the rows and columns in which noise is measured, for time
 constexpr double QUANTILE = 0.3;           // of the differences' sizes
 constexpr double NORMAL_QUANTILE = 0.385;  // the same of a normal distribution
-constexpr double SMOOTHED = 0.375;         // noise after smoothing over noise before
 
 using Line = View<std::uint16_t, 1>;
 
@@ -97,9 +97,10 @@ CMP_PART_OF_LOOP void fill_tile_levels(View<const std::uint8_t, 2> map, Index ti
   }
 }
 
-// Replaces each tile by what `combine` makes of it and the tiles around it; by its mean with them for a sum.
-template <class Combine>
-void update_by_neighbours(Array<float, 2>& tiles, Combine combine, bool is_sum) {
+// Replaces each tile by what `combine` makes of it and the tiles around it, and `finish` of that and their
+// number.
+template <class Combine, class Finish>
+void update_by_neighbours(Array<float, 2>& tiles, Combine combine, Finish finish) {
   const Array<float, 2> from(tiles.view());
   const Index rows = tiles.size(), columns = tiles.size(1);
   for (Index y = 0; y < rows; ++y) {
@@ -110,7 +111,7 @@ void update_by_neighbours(Array<float, 2>& tiles, Combine combine, bool is_sum) 
       for (Index i = left + 1; i <= right; ++i) value = combine(value, from(top, i));
       for (Index j = top + 1; j <= bottom; ++j)
         for (Index i = left; i <= right; ++i) value = combine(value, from(j, i));
-      tiles(y, x) = is_sum ? value / static_cast<float>((bottom - top + 1) * (right - left + 1)) : value;
+      tiles(y, x) = finish(value, static_cast<float>((bottom - top + 1) * (right - left + 1)));
     }
   }
 }
@@ -143,15 +144,16 @@ ContrastMap contrast_map(View<const std::uint8_t, 3> channels, Index number, Ind
                   Array<float, 2>({rows, columns}), tile_px};
   fill_mixed(channels[0].flat(), channels[1].flat(), channels[2].flat(), MIXES[number], out.value.flat());
   fill_tile_levels(out.value, tile_px, out.low, out.high);
+  const auto as_is = [](float value, float) { return value; };
   const auto sum = [](float a, float b) { return a + b; };
-  update_by_neighbours(out.low, [](float a, float b) { return std::min(a, b); }, false);
-  update_by_neighbours(out.high, [](float a, float b) { return std::max(a, b); }, false);
-  update_by_neighbours(out.low, sum, true);
-  update_by_neighbours(out.high, sum, true);
+  update_by_neighbours(out.low, [](float a, float b) { return std::min(a, b); }, as_is);
+  update_by_neighbours(out.high, [](float a, float b) { return std::max(a, b); }, as_is);
+  update_by_neighbours(out.low, sum, std::divides<float>());
+  update_by_neighbours(out.high, sum, std::divides<float>());
   return out;
 }
 
-double smoothed_noise(View<const std::uint8_t, 3> channels) {
+double channel_noise(View<const std::uint8_t, 3> channels) {
   double most = 0.0;
   for (Index c = 0; c < CHANNELS; ++c) {
     std::array<std::int32_t, 1024> counts{};

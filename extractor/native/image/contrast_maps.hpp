@@ -21,9 +21,9 @@ Array<std::uint8_t, 3> smoothed_channels(View<const std::uint8_t, 3> image);
 // Map `number` of the smoothed channels. The levels are the least and the largest values around each tile.
 ContrastMap contrast_map(View<const std::uint8_t, 3> channels, Index number, Index tile_px);
 
-// The noise of an image, as the standard deviation of its noisiest smoothed channel, gray levels of 255.
+// The standard deviation of the noise of the noisiest of an image's channels (3, H, W), gray levels of 255.
 //
 // A quantile of the diagonal second differences: edges are fewer than plain pixels.
-double smoothed_noise(View<const std::uint8_t, 3> channels);
+double channel_noise(View<const std::uint8_t, 3> channels);
 
 }  // namespace cmp::image
