@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from cmpdesign import Design, build_layout
 from extractor import Reference
+from extractor._native.numbering import BRIGHT
 from extractor.layout.lattice_tables import Lattice, cells_at, lattice_of
-from extractor.numbering.ink_fields import LIMITS, InkFields, Palette
+from extractor.numbering.ink_fields import InkFields, Palette
 from extractor.numbering.lattice_walk import WalkedCells
 from extractor.numbering.registration import PlacedPart, Registration, SeenPart
 from extractor.numbering.witnesses import BrightPlaces
@@ -137,7 +138,7 @@ def seen_part(
     # the class k of the frame is the class k + shift of the layout
     shift = (places[0] - axial[0]) @ [1, -1] % 3
     naming = np.where(np.arange(3) == shift, 0.0, -NAMING_LEAD)
-    fields = InkFields(NO_COLORS, NO_COLORS, down, whiteness, whiteness > LIMITS.bright, 1.0)
+    fields = InkFields(NO_COLORS, NO_COLORS, down, whiteness, whiteness > BRIGHT, 1.0)
     zeros = np.zeros((len(axial), 8))
     cells = WalkedCells(
         center_px=zeros[:, :2],

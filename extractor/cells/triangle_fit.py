@@ -1,4 +1,9 @@
-"""Stage 5: fits triangles to the grown regions, and to their edges with sub-pixel accuracy."""
+"""Stage 5: fits triangles to the grown regions, and to their edges with sub-pixel accuracy.
+
+The profile of the ink's light across an edge, 1 inside and 0 outside, is integrated: its area gives the edge's position
+for any blur, so that the blur need not be known. The edge is the line through two such positions. Profiles run along
+the median, not the normal, so that they avoid the other edges in any triangle.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +13,6 @@ from numpy.typing import NDArray
 from extractor._native import cells as native
 from extractor.cells.cells import Cells
 from extractor.cells.region_growing import Regions
-from extractor.cells.triangle_edges import update_triangle_corners
 from extractor.image.pyramid import PyramidLevel
 
 
@@ -33,13 +37,13 @@ def regions_as_cells(cells: Cells, regions: Regions, view: PyramidLevel) -> Cell
 
 
 def fit_edges(view: PyramidLevel, corner_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3, 2) the corners by the edges as the image shows them; NaN where no triangle is measured.
+    """(N, 3, 2) the intersections of the edges as the image shows them; NaN where no triangle is measured.
 
     Args:
         view: the image at full scale.
         corner_px: (N, 3, 2) clockwise in the image.
     """
     corners, good = corner_px.copy(), np.ones(len(corner_px), np.bool_)
-    update_triangle_corners(view, corners, good)
+    native.update_triangle_corners(view, corners, good)
     corners[~good] = np.nan
     return corners

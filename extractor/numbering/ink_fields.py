@@ -8,7 +8,6 @@ fields all the same.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,48 +20,9 @@ from extractor.result import Reason
 
 # of the misfits of a mirrored view and of swapped channels, the smaller one to the larger one; chosen
 MAX_MISFIT_RATIO = 0.7
+# (2, 3, 3) the class that is each ink, for a view of the stated or of the other side, and for each naming
+CLASS_OF_INK = np.array([[(sign * (np.arange(3) - t)) % 3 for t in range(3)] for sign in (1, -1)])
 LEAST_PALETTE_SHARE = 0.02  # of the light of an ink in a channel; chosen
-
-
-class InkFieldLimits(NamedTuple):
-    """Limits of the fields.
-
-    Attributes:
-        place_softening: in squared edges, added to the squared distance of a cell from a down-cell whose place it
-            predicts. Chosen.
-        place_reach2: squared edges; cells farther away predict no place. Derived: two steps.
-        residual_scale: in median residuals, at which a cell has half of its weight in the fit of a field. Chosen.
-        least_share: of the strongest field, the least of another one, to take its logarithm. Chosen.
-        least_scatter: of a field's light, the least scatter of cells. Chosen.
-        bright: whiteness of a down-cell that is not black. Chosen.
-        towards_corner: share of the way from its center to its corners, up to which a white cell is white. Chosen:
-            beyond it is blurred.
-        across_side: share of the way from its center to those of the cells beside it, from which on these are not
-            white.
-            Chosen: the side lies at a half.
-        corner_likeness: of the light of the center, the largest difference there. Chosen.
-        likeness: of a field's light, the largest difference of a cell that is like it. Chosen.
-        robust_rounds: fits of a field, the first ones of lower degrees. Chosen.
-        quadratic_cells, linear_cells: of a field, from which on its degree is 2 or 1. Derived: three cells for each
-            coefficient.
-    """
-
-    place_softening: float = 0.1
-    place_reach2: float = 2.5
-    residual_scale: float = 2.0
-    least_share: float = 0.02
-    least_scatter: float = 0.15
-    bright: float = 0.6
-    towards_corner: float = 0.55
-    across_side: float = 0.78
-    corner_likeness: float = 0.5
-    likeness: float = 0.5
-    robust_rounds: int = 4
-    quadratic_cells: int = 18
-    linear_cells: int = 9
-
-
-LIMITS = InkFieldLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +71,7 @@ class Palette:
             shares: of ``InkFields``.
             other_side: of the pattern seen from its other side, in whose frame class k is class -k.
         """
-        inks = np.arange(3)
-        return np.array(
-            [
-                float((self._shares * shares[((-1 if other_side else 1) * (inks - t)) % 3]).sum())
-                for t in range(3)
-            ]
-        )
+        return np.asarray((self._shares * shares[CLASS_OF_INK[int(other_side)]]).sum(axis=(1, 2)))
 
     def other_side_reason(self, shares: NDArray[np.float64]) -> Reason:
         """Why the inks are in the order of another side than stated: a mirrored view has the palette's shares as they
@@ -133,11 +87,11 @@ class Palette:
     def _misfit(self, shares: NDArray[np.float64], other_side: bool) -> float:
         """The mean difference of the log shares from the palette's by the best naming."""
         t = int(self.naming(shares, other_side).argmax())
-        ordered = shares[((-1 if other_side else 1) * (np.arange(3) - t)) % 3]
+        ordered = shares[CLASS_OF_INK[int(other_side), t]]
         return float(np.abs(ordered - np.log(self._shares)).mean())
 
 
 def ink_fields(view: PyramidLevel, cells: WalkedCells, light: NDArray[np.float64], part: int) -> InkFields:
     """The colors around a part of the walked cells, in the image at the scale of recognition; light (N, 3) of the
     cells."""
-    return InkFields(*native.ink_fields(view, cells, light, part, LIMITS))
+    return native.ink_fields(view, cells, light, part)

@@ -18,36 +18,6 @@ from extractor.cells.cells import Cells
 from extractor.image.pyramid import PyramidLevel
 
 
-class LinkInkLimits(NamedTuple):
-    """Limits of inks at links (eq. 4: at most one cell of each ink at a marker).
-
-    Attributes:
-        likeness: of the difference between a neighbour and others of its class; it is of another class if it differs
-            less from a cell of that. Chosen.
-        least_difference: of the light of cells, between inks that can be told apart. Chosen.
-    """
-
-    likeness: float = 0.5
-    least_difference: float = 0.25
-
-
-class WalkLimits(NamedTuple):
-    """Limits of a walk.
-
-    Attributes:
-        max_rounds: walks, each without the cells contradicted before. Chosen.
-        min_hole_neighbours: cells around a place without one; beside a straight rim there are two. Derived.
-        inks: of inks at links.
-    """
-
-    max_rounds: int = 6
-    min_hole_neighbours: int = 3
-    inks: LinkInkLimits = LinkInkLimits()
-
-
-LIMITS = WalkLimits()
-
-
 @dataclass(frozen=True, eq=False)
 class Walk:
     """The cells of an image with their places in the lattice.
@@ -97,12 +67,12 @@ def cell_light(view: PyramidLevel, cells: Cells, mesh: CellMesh) -> NDArray[np.f
         view: the image at the scale of recognition.
         cells, mesh: the cells and their links.
     """
-    return np.asarray(native.cell_light(view, cells.center_px, mesh.corner_px))
+    return native.cell_light(view, cells.center_px, mesh.corner_px)
 
 
 def walk_cells(mesh: CellMesh, light: NDArray[np.float64]) -> Walk:
     """Walk over all linked cells, along links that the cells' light (N, 3) does not contradict."""
-    return Walk(*native.walk_cells(mesh.links, light, LIMITS))
+    return native.walk_cells(mesh.links, light)
 
 
 def seen_from(cells: Cells, mesh: CellMesh, walk: Walk, mirrored: bool) -> WalkedCells:

@@ -12,33 +12,6 @@ from extractor.layout.lattice_tables import Lattice
 from extractor.numbering.missing_cells import NumberedTriangles
 
 
-class CornerLimits(NamedTuple):
-    """Limits of corners.
-
-    Attributes:
-        max_corner_misfit: in edges, between a triangle's corner and its prediction by the cell's neighbours. Measured:
-            rule "corner misfit".
-        max_agreed_spread: in the triangle's shortest edge, between a corner and the mean of its marker's corners, where
-            these agree. Chosen.
-        predicted_weight: of a predicted corner, relative to a corner of a fitted triangle. Chosen.
-        min_spread: least ratio of a cell's neighbours' spread across to along; below it they lie on one line. Chosen.
-        max_triangle_misfit: of the distance to a neighbour, from its center to the prediction by the cell's triangle.
-            Measured: rule "mapped by triangle".
-        min_rival_misfit: the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances. Chosen
-            below that.
-    """
-
-    max_corner_misfit: float = 0.28
-    max_agreed_spread: float = 0.2
-    predicted_weight: float = 0.05
-    min_spread: float = 0.2
-    max_triangle_misfit: float = 0.3
-    min_rival_misfit: float = 0.8
-
-
-LIMITS = CornerLimits()
-
-
 class InitialMarkers(NamedTuple):
     """Numbered markers before refinement.
 
@@ -68,5 +41,5 @@ def merge_corners(cells: NumberedTriangles, lattice: Lattice) -> InitialMarkers:
     Returns:
         The markers before refinement.
     """
-    tables = lattice.layout_cells, lattice.corner_ids, len(lattice.marker_mm)
-    return InitialMarkers(*native.merge_corners(cells, cells, *tables, LIMITS))
+    markers = len(lattice.marker_mm)
+    return native.merge_corners(cells, cells, lattice.layout_cells, lattice.corner_ids, markers)

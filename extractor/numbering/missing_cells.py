@@ -10,23 +10,6 @@ from numpy.typing import NDArray
 from extractor._native import numbering as native
 from extractor.layout.lattice_tables import Lattice
 from extractor.numbering.registration import Numbering
-from extractor.numbering.witnesses import ATTACHMENT, MapPrior
-
-
-class MissingCellLimits(NamedTuple):
-    """Limits of predicted cells.
-
-    Attributes:
-        prior: of the map through the cells around. Chosen, see ``MapPrior``.
-        min_neighbours: numbered cells that share a corner with a predicted one; with those around them they determine
-            a map. Chosen.
-    """
-
-    prior: MapPrior = ATTACHMENT.prior
-    min_neighbours: int = 2
-
-
-LIMITS = MissingCellLimits()
 
 
 class NumberedTriangles(NamedTuple):
@@ -68,7 +51,7 @@ def with_missing_cells(
     known = numbering.cell >= 0
     corners, cell = corner_px[known], numbering.cell[known]
     center = np.ascontiguousarray(corners.mean(axis=1))
-    found, predicted = native.missing_cells(center, cell, lattice.layout_cells, LIMITS)
+    found, predicted = native.missing_cells(center, cell, lattice.layout_cells)
     if not numbering.mirrored:  # the layout's order is clockwise in images of the back
         predicted = predicted[:, ::-1]
     corners = np.concatenate([corners, predicted])

@@ -25,10 +25,7 @@ from extractor.numbering.code_bits import Agreement, CodeBits
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
-    ATTACHMENT,
     WHITE,
-    WITNESSES,
-    AttachmentLimits,
     BrightPlaces,
 )
 from extractor.result import Origin, Reason
@@ -44,7 +41,6 @@ OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black 
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
 JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
 MIN_NUMBERED_SHARE = 0.5  # of the cells of large parts; with fewer, all motions are compared. Chosen
-ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
 
 
 class RegisteredLayout(NamedTuple):
@@ -315,8 +311,7 @@ class Registration:
         axial = np.ascontiguousarray(seen.cells.axial[seen.cells.part == seen.part])
         bits = CodeBits.of(fields, axial) if self._is_coded else None
         white = bright.white_odds(fields) if bits is None else bits.odds
-        found = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout, WITNESSES)
-        motions = Motions(*found)
+        motions = native.register_part(axial, seen.naming, fields.down_axial, white, self._layout)
         white_axial = fields.down_axial[fields.is_triangle]
         return PlacedPart(seen, motions, white_axial, self._other_whites(white_axial, motions), bits)
 
@@ -333,8 +328,9 @@ class Registration:
             for _ in range(turn):
                 q, r = -q - r, q - 1
             q, r = q + dq, r + dr
-            beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
-            count += (q, r) != (0, 0) and bool((beside >= 0).all())
+            if (q, r) != (0, 0):
+                beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
+                count += bool((beside >= 0).all())
         return count
 
     def _with_all_parts(self, placed: PlacedPart, count: int) -> list[PlacedPart]:
@@ -348,11 +344,13 @@ class Registration:
         """
         if not 1 < count <= MAX_TIED:
             return []
-        parts, motions = ATTACHMENT._replace(with_single_cells=False), placed.motions
+        motions = placed.motions
         # the pads of a family have the same cells at the same places
         _, first, same = np.unique(motions.motion[:count], axis=0, return_index=True, return_inverse=True)
-        counts = [np.count_nonzero(self._placed_cells(placed, int(k), parts) >= 0) for k in first]
-        score = motions.score[:count] + WITNESSES.outside_weight * np.array(counts)[same.reshape(-1)]
+        counts = [
+            np.count_nonzero(self._placed_cells(placed, int(k), with_single_cells=False) >= 0) for k in first
+        ]
+        score = motions.score[:count] + native.OUTSIDE_WEIGHT * np.array(counts)[same.reshape(-1)]
         order = np.argsort(-score, kind="stable")
         chosen = motions.chosen(order, score[order])
         decided = placed._replace(motions=chosen, other_whites=self._other_whites(placed.white_axial, chosen))
@@ -360,28 +358,23 @@ class Registration:
         return [decided] if is_certain and decided.is_code else []
 
     def _placed_cells(
-        self, placed: PlacedPart, number: int, limits: AttachmentLimits = ATTACHMENT
+        self, placed: PlacedPart, number: int, with_single_cells: bool = True
     ) -> NDArray[np.int32]:
         """(N,) int32, the layout's cell of each cell of the image by a motion of the part, or -1."""
-        seen = placed.seen
-        own = seen.cells.part == seen.part
-        axial = np.ascontiguousarray(seen.cells.axial[own])
-        turn, dq, dr = (int(v) for v in placed.motions.motion[number])
-        cell = np.full(len(own), -1, np.int32)
-        cell[own] = native.moved_cells(axial, turn, dq, dr, self._layout.cell_lookup)
-        shift = _class_shift(self._lattice, cell[own], axial)
-        odds = np.ascontiguousarray(seen.fields.odds[:, (np.arange(3) - shift) % 3])
-        cell = native.attach_parts(
+        seen, motion = placed.seen, placed.motions.motion[number]
+        cell = native.moved_cells(seen.cells, seen.part, motion, self._layout.cell_lookup)
+        turn, dq, dr = motion.tolist()
+        # a turn shifts the classes (q - r) mod 3 by -1
+        odds = np.roll(seen.fields.odds, dq - dr - turn, axis=1)
+        return native.attach_parts(
             seen.cells,
             cell,
             odds,
             self._lattice.layout_cells,
             self._layout.axial,
             self._layout.cell_lookup,
-            limits,
+            with_single_cells,
         )
-        odd = is_odd(odds, self._lattice.ink[np.maximum(cell, 0)].astype(np.intp) - 1)
-        return np.where(odd, -1, cell).astype(np.int32)
 
     def _number_with(self, placed: PlacedPart, parts: list[PlacedPart]) -> Numbering | Refusal | None:
         """The numbers of all cells by the part whose motion is certain; none if the other parts contradict the
@@ -416,15 +409,6 @@ def _origin(placed: PlacedPart) -> Origin:
     return Origin.WHITE if placed.motions.white[0] > 0.0 else Origin.OUTLINE
 
 
-def is_odd(odds: NDArray[np.float64], own: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """(N,) bool, the cells whose color is not that of their own class (N,), modulo 3, but that of another class.
-
-    Args:
-        odds: (N, 3), the log likelihoods of the classes.
-    """
-    return np.asarray(odds[np.arange(len(odds)), own % 3] < ODD_INK)
-
-
 def _uncertain_reason(placed: PlacedPart) -> Reason:
     """Why a part has no certain motion."""
     if placed.bits is not None:
@@ -436,10 +420,3 @@ def _uncertain_reason(placed: PlacedPart) -> Reason:
     if whites > 1:
         return Reason.SEVERAL_PADS
     return Reason.AMBIGUOUS if np.count_nonzero(white[close] > 0.0) > 1 else Reason.REFERENCE_LOST
-
-
-def _class_shift(lattice: Lattice, cell: NDArray[np.int32], axial: NDArray[np.int32]) -> int:
-    """By which a motion shifts the classes (q - r) mod 3."""
-    first = int(np.argmax(cell >= 0))
-    q, r = lattice.axial[cell[first]]
-    return int((q - r - axial[first, 0] + axial[first, 1]) % 3)

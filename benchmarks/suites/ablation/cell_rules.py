@@ -96,12 +96,4 @@ CELLS = (
         "direction_tolerance = 0.56",
         "direction_tolerance = 1e9",
     ),
-    Rule(
-        "shorter profiles",
-        "large cells are measured again by shorter profiles",
-        "accuracy",
-        "extractor/native/cells/triangle_edges.hpp",
-        "max_passes = 3",
-        "max_passes = 1",
-    ),
 )

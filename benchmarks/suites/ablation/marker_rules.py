@@ -9,17 +9,17 @@ PLACES = (
         "mapped by triangle",
         "a cell with too few neighbours has the map of its triangle",
         "accuracy",
-        "extractor/numbering/marker_places.py",
-        "max_triangle_misfit: float = 0.3",
-        "max_triangle_misfit: float = 0.0",
+        "extractor/native/numbering/marker_places.hpp",
+        "max_triangle_misfit = 0.3",
+        "max_triangle_misfit = 0.0",
     ),
     Rule(
         "corner misfit",
         "a triangle that its neighbours contradict gives no corners",
         "accuracy",
-        "extractor/numbering/marker_places.py",
-        "max_corner_misfit: float = 0.28",
-        "max_corner_misfit: float = np.inf",
+        "extractor/native/numbering/marker_places.hpp",
+        "max_corner_misfit = 0.28",
+        "max_corner_misfit = 1e9",
     ),
 )
 

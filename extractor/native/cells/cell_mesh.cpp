@@ -15,7 +15,7 @@ constexpr int CORNERS = 3;
 struct Vector {
   double x, y;
 
-  double length() const { return std::sqrt(x * x + y * y); }
+  double square() const { return x * x + y * y; }
   friend Vector operator-(Vector a, Vector b) { return {a.x - b.x, a.y - b.y}; }
 };
 
@@ -69,13 +69,14 @@ class Triangles {
     }
     return out;
   }
-  // The distance between the corners of a contact, in edges of the smaller cell, of triangles without a
-  // swelling.
-  double misfit(const Contact& contact, double swelling) const {
+  // The square of the distance between the corners of a contact, in edges of the smaller cell, of triangles
+  // without a swelling.
+  double squared_misfit(const Contact& contact, double swelling) const {
     const Vector own = at(contact.from, STEP_CORNERS[contact.step][0]), way = way_of(contact);
     const Vector other = at(contact.to, STEP_CORNERS[contact.back][0]);
     const Vector gap{way.x - (own.x - other.x) / swelling, way.y - (own.y - other.y) / swelling};
-    return gap.length() / std::min(edge_[contact.from], edge_[contact.to]);
+    const double edge = std::min(edge_[contact.from], edge_[contact.to]);
+    return gap.square() / (edge * edge);
   }
   // The distance of two cells at which their triangles would just meet, over their distance.
   double swelling(const Contact& contact) const {
@@ -90,9 +91,9 @@ class Triangles {
   Vector way_of(const Contact& c) const {
     return {center_(c.to, 0) - center_(c.from, 0), center_(c.to, 1) - center_(c.from, 1)};
   }
-  // How far the neighbour lies from where the cell's own triangle expects it, in edges.
+  // The square of the neighbour's distance from where the cell's own triangle expects it, px^2.
   double direction_misfit(Index i, Index shared, Index from, Vector way) const {
-    return (way - (at(i, shared) - at(i, from))).length() / edge_[i];
+    return (way - (at(i, shared) - at(i, from))).square();
   }
   void add_contact(std::vector<Contact>& out, Index i, int own, Index other, Index shared,
                    double direction_tolerance) const {
@@ -103,7 +104,8 @@ class Triangles {
     // the neighbour's corner `shared` is the lattice's corner `place`; the others follow in the same order
     const auto back = static_cast<int>((shared + own - place + CORNERS) % CORNERS);
     const double reverse = direction_misfit(other, shared, back, {-way.x, -way.y});
-    if (std::max(std::min(at_a, at_b), reverse) > direction_tolerance) return;
+    const double reach = direction_tolerance * edge_[i], back_reach = direction_tolerance * edge_[other];
+    if (std::min(at_a, at_b) > reach * reach || reverse > back_reach * back_reach) return;
     out.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(other),
                    static_cast<std::int8_t>(step_of(own, place)),
                    static_cast<std::int8_t>(step_of(static_cast<int>(shared), back))});
@@ -120,10 +122,10 @@ class MutualContacts {
  public:
   MutualContacts(const Triangles& triangles, const std::vector<Contact>& contacts, Index cells,
                  double swelling, double tolerance)
-      : best_({cells, STEPS}, -1), misfit_({cells, STEPS}, tolerance), contacts_(contacts) {
+      : best_({cells, STEPS}, -1), misfit_({cells, STEPS}, tolerance * tolerance), contacts_(contacts) {
     for (std::size_t n = 0; n < contacts.size(); ++n) {
       const Contact& one = contacts[n];
-      const double misfit = triangles.misfit(one, swelling);
+      const double misfit = triangles.squared_misfit(one, swelling);
       if (misfit >= misfit_(one.from, one.step)) continue;
       misfit_(one.from, one.step) = misfit;
       best_(one.from, one.step) = static_cast<std::int32_t>(n);
@@ -139,11 +141,11 @@ class MutualContacts {
     const Contact& reverse = contacts_[static_cast<std::size_t>(other)];
     return reverse.to == i && reverse.back == step ? &one : nullptr;
   }
-  double misfit(Index i, Index step) const { return misfit_(i, step); }
+  double misfit(Index i, Index step) const { return std::sqrt(misfit_(i, step)); }
 
  private:
   Array<std::int32_t, 2> best_;
-  Array<double, 2> misfit_;
+  Array<double, 2> misfit_;  // the squares
   const std::vector<Contact>& contacts_;
 };
 

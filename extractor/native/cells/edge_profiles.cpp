@@ -45,12 +45,12 @@ void fill_background_colors(const ProfileImage& image, View<double, 1> edges, In
 }
 
 // Writes the fixed-point beginnings and steps of the first or second profiles; 0 for invalid edges.
-void fill_profile_starts(bool second, View<const double, 1> edges, Index count, double half,
+void fill_profile_starts(bool second, View<const double, 1> edges, Index count, double reach, double half,
                          View<std::int64_t, 1> points) {
   const Index middle_x = second ? SECOND_X : FIRST_X, middle_y = second ? SECOND_Y : FIRST_Y;
   for (Index i = 0; i < count; ++i) {
     const bool is_valid = edges[VALID + i] > 0.0;
-    const double reach = edges[REACH + i], step = is_valid ? reach / half : 0.0;
+    const double step = is_valid ? reach / half : 0.0;
     const double x = edges[middle_x + i] - reach * edges[MEDIAN_X + i];
     const double y = edges[middle_y + i] - reach * edges[MEDIAN_Y + i];
     points[numeric::X + i] = numeric::fixed_point_coordinate(is_valid ? x : 0.0);
@@ -92,14 +92,14 @@ void fill_profile_places(const ProfileImage& image, View<double, 1> edges, Index
                          const TriangleEdgeLimits& limits) {
   const double right = static_cast<double>(image.width) - 1.0 - limits.border_margin_px;
   const double bottom = static_cast<double>(image.height) - 1.0 - limits.border_margin_px;
-  const double share = limits.first_profile;
+  const double share = limits.first_profile, reach = limits.profile_reach;
   for (Index i = 0; i < count; ++i) {
     const double dx = share * (edges[END_X + i] - edges[START_X + i]);
     const double dy = share * (edges[END_Y + i] - edges[START_Y + i]);
     const double x = edges[START_X + i] + dx, y = edges[START_Y + i] + dy;
     const double end_x = edges[END_X + i] - dx, end_y = edges[END_Y + i] - dy;
-    const double wide = edges[REACH + i] * std::abs(edges[MEDIAN_X + i]);
-    const double high = edges[REACH + i] * std::abs(edges[MEDIAN_Y + i]);
+    const double wide = reach * std::abs(edges[MEDIAN_X + i]);
+    const double high = reach * std::abs(edges[MEDIAN_Y + i]);
     edges[FIRST_X + i] = x, edges[FIRST_Y + i] = y;
     edges[SECOND_X + i] = end_x, edges[SECOND_Y + i] = end_y;
     const bool is_inside = (std::min(x, end_x) >= wide) & (std::min(y, end_y) >= high) &
@@ -115,7 +115,7 @@ void fill_profile_areas(const ProfileImage& image, bool second, View<double, 1> 
   const auto light = image.light;
   const auto half = static_cast<double>(limits.half_profile);
   const double lowest = limits.min_profile_level, highest = limits.max_profile_level;
-  run_loop<fill_profile_starts>(second, edges, count, half, points);
+  run_loop<fill_profile_starts>(second, edges, count, limits.profile_reach, half, points);
   for (Index i = 0; i < count; ++i) {
     edges[AREA_BEFORE + i] = edges[AREA + i];
     edges[AREA + i] = 0.0;

@@ -14,22 +14,22 @@ constexpr Index column(Index k) { return k * numeric::BATCH_POINTS; }
 
 // the ends
 inline constexpr Index START_X = column(0), START_Y = column(1), END_X = column(2), END_Y = column(3);
-// the cell's center, the distance of its first corner from the center, and the profiles' reach
-inline constexpr Index CENTER_X = column(4), CENTER_Y = column(5), SIZE = column(6), REACH = column(7);
+// the cell's center, and the distance of its first corner from the center
+inline constexpr Index CENTER_X = column(4), CENTER_Y = column(5), SIZE = column(6);
 // the normal, the edge's distance from the center, and the vector from the center to its middle
-inline constexpr Index NORMAL_X = column(8), NORMAL_Y = column(9), DEPTH = column(10);
-inline constexpr Index MEDIAN_X = column(11), MEDIAN_Y = column(12);
+inline constexpr Index NORMAL_X = column(7), NORMAL_Y = column(8), DEPTH = column(9);
+inline constexpr Index MEDIAN_X = column(10), MEDIAN_Y = column(11);
 // the ink's color; the weights that turn a color into a share of ink; the background's weighted color
-inline constexpr Index INK = column(13), WEIGHT = column(16), BACKGROUND = column(19);
+inline constexpr Index INK = column(12), WEIGHT = column(15), BACKGROUND = column(18);
 // 1 if the edge is valid, else 0
-inline constexpr Index VALID = column(20);
+inline constexpr Index VALID = column(19);
 // the profiles' middles, and the areas under them
-inline constexpr Index FIRST_X = column(21), FIRST_Y = column(22), SECOND_X = column(23),
-                       SECOND_Y = column(24);
-inline constexpr Index AREA = column(25), AREA_BEFORE = column(26);
+inline constexpr Index FIRST_X = column(20), FIRST_Y = column(21), SECOND_X = column(22),
+                       SECOND_Y = column(23);
+inline constexpr Index AREA = column(24), AREA_BEFORE = column(25);
 // the line n . p = d
-inline constexpr Index LINE_X = column(27), LINE_Y = column(28), LINE_D = column(29);
-inline constexpr Index COLUMNS = 30;
+inline constexpr Index LINE_X = column(26), LINE_Y = column(27), LINE_D = column(28);
+inline constexpr Index COLUMNS = 29;
 
 // An image as the samples take it.
 struct ProfileImage {

@@ -9,13 +9,10 @@ namespace cmp::cells {
 
 namespace {
 
-constexpr double HEIGHTS = 2.0;  // the center of a triangle is twice as far from a corner as from an edge
-
 using Indices = View<const Index, 1>;
 
-// Writes the ends, centers, sizes and reaches: the first edge of each cell, then the second, then the third.
-void fill_edges(View<const double, 3> corners, Indices cells, View<const double, 1> reach,
-                View<double, 1> edges) {
+// Writes the ends, centers and sizes: the first edge of each cell, then the second, then the third.
+void fill_edges(View<const double, 3> corners, Indices cells, View<double, 1> edges) {
   const Index count = cells.size();
   for (Index n = 0; n < count; ++n) {
     const auto corner = corners[cells[n]];
@@ -28,7 +25,7 @@ void fill_edges(View<const double, 3> corners, Indices cells, View<const double,
       edges[START_X + to] = corner(k, 0), edges[START_Y + to] = corner(k, 1);
       edges[END_X + to] = corner(end, 0), edges[END_Y + to] = corner(end, 1);
       edges[CENTER_X + to] = x, edges[CENTER_Y + to] = y;
-      edges[SIZE + to] = size, edges[REACH + to] = reach[cells[n]];
+      edges[SIZE + to] = size;
     }
   }
 }
@@ -51,8 +48,9 @@ void fill_normals(View<double, 1> edges, Index count) {
 void fill_edge_lines(View<double, 1> edges, Index count, const TriangleEdgeLimits& limits) {
   const auto half = static_cast<double>(limits.half_profile);
   const double first_profile = limits.first_profile, between = 1.0 - 2 * limits.first_profile;
+  const double reach = limits.profile_reach, step = reach / half;
   for (Index i = 0; i < count; ++i) {
-    const double depth = edges[DEPTH + i], reach = edges[REACH + i], step = reach / half;
+    const double depth = edges[DEPTH + i];
     const double first = depth * (edges[AREA_BEFORE + i] * step - reach);
     const double second = depth * (edges[AREA + i] * step - reach);
     const double slope = (second - first) / between;
@@ -86,34 +84,18 @@ bool fill_line_intersections(View<const double, 1> edges, Index n, Index count, 
   return true;
 }
 
-// What a pass over some cells changes.
-struct Measured {
-  View<double, 3> corners;  // (N, 3, 2)
-  View<bool, 1> good;       // (N,)
-  View<double, 1> reach;    // (N,)
-};
-
-// Moves the cells' corners to the lines' intersections, and writes the next pass's reach (N,), 0 for none.
-//
-// A second pass always follows the first one: the values of blurred light make cells look too large at the
-// start.
-void update_corners(View<const double, 1> edges, Indices cells, const Measured& measured, bool first,
+// Moves the cells' corners to the lines' intersections.
+void update_corners(View<const double, 1> edges, Indices cells, View<double, 3> corners, View<bool, 1> good,
                     const TriangleEdgeLimits& limits) {
   const Index count = cells.size();
-  const double fine_size = HEIGHTS * limits.fine_reach_px;
   std::array<double, 6> corner_memory{};
   const View<double, 2> moved(corner_memory.data(), {3, 2});
   for (Index n = 0; n < count; ++n) {
     const Index i = cells[n];
-    const double size = edges[SIZE + n], reach = measured.reach[i];
     const bool is_valid = edges[VALID + n] * edges[VALID + count + n] * edges[VALID + 2 * count + n] > 0.0;
-    const bool is_good = is_valid && fill_line_intersections(edges, n, count, limits.max_corner_shift * size,
-                                                             limits.min_sine, moved);
-    measured.good[i] = is_good;
-    if (is_good) copy<double, 2>(moved, measured.corners[i]);
-    const bool is_done = !is_good || (!first && reach * size < fine_size);
-    measured.reach[i] =
-        is_done ? 0.0 : std::min(std::max(limits.next_reach * reach, fine_size / size), reach);
+    good[i] = is_valid && fill_line_intersections(edges, n, count, limits.max_corner_shift * edges[SIZE + n],
+                                                  limits.min_sine, moved);
+    if (good[i]) copy<double, 2>(moved, corners[i]);
   }
 }
 
@@ -125,26 +107,21 @@ void update_triangle_corners(const image::PyramidLevel& view, View<double, 3> co
   Array<double, 1> edge_table({COLUMNS * numeric::BATCH_POINTS}, 0.0);
   const auto edges = edge_table.view();
   auto buffers = numeric::allocate_sample_buffers();
-  std::vector<Index> left;
+  std::vector<Index> measured;
   for (Index i = 0; i < good.size(); ++i)
-    if (good[i]) left.push_back(i);
-  Array<double, 1> reach({good.size()}, limits.profile_reach);
-  const Measured measured{corners, good, reach};
-  for (std::int64_t number = 0; number < limits.max_passes; ++number) {
-    const Indices all(left.data(), {static_cast<Index>(left.size())});
-    for (Index begin = 0; begin < all.size(); begin += BATCH_CELLS) {
-      const auto cells = all.slice(begin, std::min(begin + BATCH_CELLS, all.size()));
-      const Index count = 3 * cells.size();
-      fill_edges(corners, cells, reach, edges);
-      fill_normals(edges, count);
-      fill_contrast_weights(image, edges, count, buffers, limits);
-      fill_profile_places(image, edges, count, limits);
-      fill_profile_areas(image, false, edges, count, buffers, limits);
-      fill_profile_areas(image, true, edges, count, buffers, limits);
-      fill_edge_lines(edges, count, limits);
-      update_corners(edges, cells, measured, number == 0, limits);
-    }
-    std::erase_if(left, [&](Index i) { return !(reach[i] > 0.0); });
+    if (good[i]) measured.push_back(i);
+  const Indices all(measured.data(), {static_cast<Index>(measured.size())});
+  for (Index begin = 0; begin < all.size(); begin += BATCH_CELLS) {
+    const auto cells = all.slice(begin, std::min(begin + BATCH_CELLS, all.size()));
+    const Index count = 3 * cells.size();
+    fill_edges(corners, cells, edges);
+    fill_normals(edges, count);
+    fill_contrast_weights(image, edges, count, buffers, limits);
+    fill_profile_places(image, edges, count, limits);
+    fill_profile_areas(image, false, edges, count, buffers, limits);
+    fill_profile_areas(image, true, edges, count, buffers, limits);
+    fill_edge_lines(edges, count, limits);
+    update_corners(edges, cells, corners, good, limits);
   }
 }
 

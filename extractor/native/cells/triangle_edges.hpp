@@ -13,16 +13,9 @@ struct TriangleEdgeLimits {
   std::int64_t half_profile = 4;  // samples on each side of an edge. Chosen.
   // from profiles to the last row and column; more than half a sub-pixel step. Derived.
   double border_margin_px = 0.01;
-  // half length of a profile in the first pass, in vectors from the cell's center to the edge's middle.
-  // Chosen.
+  // half length of a profile, in vectors from the cell's center to the edge's middle. Chosen: a second pass
+  // with shorter profiles lost more markers and made no picture more accurate.
   double profile_reach = 0.5;
-  // half length of a profile, about; longer profiles are followed by shorter ones. Measured: rule "shorter
-  // profiles".
-  double fine_reach_px = 8.0;
-  // half length of a profile, relative to the pass before. Measured: rule "shorter profiles".
-  double next_reach = 0.25;
-  // the first one and those with shorter profiles. Measured: rule "shorter profiles".
-  std::int64_t max_passes = 3;
   // of the disc in which the ink's color is measured, relative to the corner's distance from the center.
   // Chosen.
   double ink_radius = 0.2;
@@ -44,9 +37,8 @@ struct TriangleEdgeLimits {
 
 // Moves the corners of triangles to the intersections of their measured edges.
 //
-// The first profiles reach across the cell; for large cells shorter ones follow. corners (N, 3, 2), px,
-// clockwise in the image, are updated; good (N,), the triangles to measure, becomes false for those without
-// valid edges.
+// corners (N, 3, 2), px, clockwise in the image, are updated; good (N,), the triangles to measure, becomes
+// false for those without valid edges.
 void update_triangle_corners(const image::PyramidLevel& view, View<double, 3> corners, View<bool, 1> good,
                              const TriangleEdgeLimits& limits);
 

@@ -11,18 +11,18 @@
 namespace cmp::numbering {
 
 void add_numbering(nb::module_ module) {
-  bind<&walk_cells>(module, "walk_cells", {"links", "light", "limits"});
+  module.attr("BRIGHT") = InkFieldLimits{}.bright;
+  module.attr("OUTSIDE_WEIGHT") = WitnessLimits{}.outside_weight;
+  bind<&walk_cells>(module, "walk_cells", {"links", "light"});
   bind<&cell_light>(module, "cell_light", {"view", "center", "corner"});
-  bind<&ink_fields>(module, "ink_fields", {"view", "cells", "light", "part", "limits"});
-  bind<&register_part>(module, "register_part",
-                       {"axial", "naming", "white_axial", "white", "layout", "limits"});
+  bind<&ink_fields>(module, "ink_fields", {"view", "cells", "light", "part"});
+  bind<&register_part>(module, "register_part", {"axial", "naming", "white_axial", "white", "layout"});
   bind<&cells_beside>(module, "cells_beside", {"axial", "down_axial"});
-  bind<&moved_cells>(module, "moved_cells", {"axial", "turn", "dq", "dr", "cell_lookup"});
+  bind<&moved_cells>(module, "moved_cells", {"cells", "part", "motion", "cell_lookup"});
   bind<&attach_parts>(module, "attach_parts",
-                      {"cells", "cell", "odds", "layout", "axial", "cell_lookup", "limits"});
-  bind<&missing_cells>(module, "missing_cells", {"center", "cell", "layout", "limits"});
-  bind<&merge_corners>(module, "merge_corners",
-                       {"cells", "numbers", "layout", "corner_ids", "markers", "limits"});
+                      {"cells", "cell", "odds", "layout", "axial", "cell_lookup", "with_single_cells"});
+  bind<&missing_cells>(module, "missing_cells", {"center", "cell", "layout"});
+  bind<&merge_corners>(module, "merge_corners", {"cells", "numbers", "layout", "corner_ids", "markers"});
 }
 
 }  // namespace cmp::numbering

@@ -45,20 +45,31 @@ std::vector<Color> light_at_points(const image::PyramidLevel& view, View<const d
   return out;
 }
 
-// The median of each channel over the known colors; NaN without any.
-Color median_color(const Color* colors, Index count) {
-  constexpr Index FEW = 6;
-  Color out{NOWHERE, NOWHERE, NOWHERE};
-  std::array<double, FEW> few;
-  std::vector<double> many(count > FEW ? static_cast<std::size_t>(count) : 0);
-  double* const values = count > FEW ? many.data() : few.data();
-  for (Index c = 0; c < CHANNELS; ++c) {
-    Index known = 0;
-    for (Index i = 0; i < count; ++i)
-      if (std::isfinite(colors[i][c])) values[known++] = colors[i][c];
-    const View<double, 1> all(values, {known});
-    if (known > 0) out[c] = count > FEW ? numeric::median_of_many(all) : numeric::median_of(all, known);
+// The median of each channel over the known colors, which lose their order; NaN without any.
+//
+// A few colors are sorted by minima and maxima: a comparison that is often guessed wrong takes longer.
+Color median_color(std::vector<Color>& colors) {
+  constexpr std::size_t FEW = 6;
+  std::erase_if(colors, [](const Color& one) { return !std::isfinite(one[0]); });
+  const std::size_t count = colors.size();
+  if (count == 0) return {NOWHERE, NOWHERE, NOWHERE};
+  Color out;
+  if (count > FEW) {
+    std::vector<double> values(count);
+    for (Index c = 0; c < CHANNELS; ++c) {
+      for (std::size_t i = 0; i < count; ++i) values[i] = colors[i][c];
+      out[c] = numeric::median_of_many(View<double, 1>(values.data(), {static_cast<Index>(count)}));
+    }
+    return out;
   }
+  for (std::size_t end = count - 1; end > 0; --end)
+    for (std::size_t i = 0; i < end; ++i)
+      for (Index c = 0; c < CHANNELS; ++c) {
+        const double low = std::min(colors[i][c], colors[i + 1][c]);
+        colors[i + 1][c] = std::max(colors[i][c], colors[i + 1][c]);
+        colors[i][c] = low;
+      }
+  for (Index c = 0; c < CHANNELS; ++c) out[c] = 0.5 * (colors[(count - 1) / 2][c] + colors[count / 2][c]);
   return out;
 }
 
@@ -226,18 +237,18 @@ class DownLight {
   // (D,) light over that of the down-cells around, relative to the strongest inks there; NaN outside the
   // image. (D,) whether the light fills the triangle of a bright down-cell, and no cell beside it.
   std::pair<Array<double, 1>, Array<bool, 1>> whiteness() const {
-    const Color usual = median_color(light_.data(), static_cast<Index>(light_.size()));
+    std::vector<Color> around(light_);
+    const Color usual = median_color(around);
     Array<double, 1> whiteness({down_.size()}, NOWHERE);
     Array<bool, 1> is_triangle({down_.size()}, false);
-    std::array<Color, std::size(NEIGHBOURS)> around;
     for (Index n = 0; n < down_.size(); ++n) {
       if (!std::isfinite(light_[n][0])) continue;
-      Index known = 0;
+      around.clear();
       for (const auto& step : NEIGHBOURS) {
         const std::int32_t other = down_.number(down_.q(n) + step[0], down_.r(n) + step[1]);
-        if (other >= 0 && std::isfinite(light_[other][0])) around[known++] = light_[other];
+        if (other >= 0 && std::isfinite(light_[other][0])) around.push_back(light_[other]);
       }
-      const Color black = known < 2 ? usual : median_color(around.data(), known),
+      const Color black = around.size() < 2 ? usual : median_color(around),
                   over = difference(light_[n], black);
       double own = 0.0, most = 0.0;
       Color strongest{};
@@ -330,10 +341,12 @@ Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 
         xy((1 + SIDES) * i + k, axis) =
             k == 0 ? center(i, axis) : 2.0 * center(i, axis) - corner(i, k - 1, axis);
   const auto shown = light_at_points(view, xy);
+  std::vector<Color> beside;
   for (Index i = 0; i < count; ++i) {
     const auto own = shown.begin() + (1 + SIDES) * i;
     if (!std::isfinite((*own)[0])) continue;
-    const Color black = median_color(&*own + 1, SIDES);
+    beside.assign(own + 1, own + 1 + SIDES);
+    const Color black = median_color(beside);
     if (!std::isfinite(black[0])) continue;
     const Color light = difference(*own, black);
     std::copy(light.begin(), light.end(), out[i].begin());

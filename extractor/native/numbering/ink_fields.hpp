@@ -2,26 +2,36 @@
 // classes, and the light at the places of its down-cells.
 #pragma once
 
-#include <tuple>
-
 #include "base/array.hpp"
 #include "image/pyramid.hpp"
 
 namespace cmp::numbering {
 
-// The limits of the fields; the Python module explains them.
+// The limits of the fields.
 struct InkFieldLimits {
-  double place_softening, place_reach2, residual_scale, least_share, least_scatter, bright, towards_corner,
-      across_side, corner_likeness, likeness;
-  std::int64_t robust_rounds, quadratic_cells, linear_cells;
-
-  template <class F>
-  static InkFieldLimits read(const F& f) {
-    return {f["place_softening"], f["place_reach2"], f["residual_scale"], f["least_share"],
-            f["least_scatter"],   f["bright"],       f["towards_corner"], f["across_side"],
-            f["corner_likeness"], f["likeness"],     f["robust_rounds"],  f["quadratic_cells"],
-            f["linear_cells"]};
-  }
+  // in squared edges, added to the squared distance of a cell from a down-cell whose place it predicts.
+  // Chosen.
+  double place_softening = 0.1;
+  // squared edges; cells farther away predict no place. Derived: two steps.
+  double place_reach2 = 2.5;
+  // in median residuals, at which a cell has half of its weight in the fit of a field. Chosen.
+  double residual_scale = 2.0;
+  // of the strongest field, the least of another one, to take its logarithm. Chosen.
+  double least_share = 0.02;
+  double least_scatter = 0.15;  // of a field's light, the least scatter of cells. Chosen.
+  double bright = 0.6;          // whiteness of a down-cell that is not black. Chosen.
+  // share of the way from its center to its corners, up to which a white cell is white. Chosen: beyond it is
+  // blurred.
+  double towards_corner = 0.55;
+  // share of the way from its center to those of the cells beside it, from which on these are not white.
+  // Chosen: the side lies at a half.
+  double across_side = 0.78;
+  double corner_likeness = 0.5;  // of the light of the center, the largest difference there. Chosen.
+  // of a field's light, the largest difference of a cell that is like it. Chosen.
+  double likeness = 0.5;
+  std::int64_t robust_rounds = 4;  // fits of a field, the first ones of lower degrees. Chosen.
+  // of a field, from which on its degree is 2 or 1. Derived: three cells for each coefficient.
+  std::int64_t quadratic_cells = 18, linear_cells = 9;
 };
 
 // The N cells of an image, walked: the cells of one part have axial coordinates of one frame.
@@ -40,17 +50,20 @@ struct WalkedCells {
 Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 2> center,
                             View<const double, 3> corner);
 
-// Colors of the cells of one part; light (N, 3) by cell_light.
-//
-// shares (3, 3), the mean log of each class's share of the light in each channel (B, G, R); odds (N, 3), the
-// log likelihoods of each cell of the image for the three classes, relative to the likeliest one; then of the
-// part's down-cells the axial places (D, 2), whiteness (D,): light over the local black, relative to the
-// strongest inks there, NaN outside the image; and (D,) whether it is bright, and the light fills its
-// triangle and no cell beside it. The last one is the share of the part's cells whose color is like that of
-// their class's field.
-using InkFields = std::tuple<Array<double, 2>, Array<double, 2>, Array<std::int32_t, 2>, Array<double, 1>,
-                             Array<bool, 1>, double>;
+// The colors around one part; the Python class explains them.
+struct InkFields {
+  Array<double, 2> shares;            // (3, 3)
+  Array<double, 2> odds;              // (N, 3)
+  Array<std::int32_t, 2> down_axial;  // (D, 2)
+  Array<double, 1> whiteness;         // (D,)
+  Array<bool, 1> is_triangle;         // (D,)
+  double fit;
 
+  CMP_RECORD("extractor.numbering.ink_fields.InkFields", shares, odds, down_axial, whiteness, is_triangle,
+             fit)
+};
+
+// Colors of the cells of one part; light (N, 3) by cell_light.
 InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, View<const double, 2> light,
                      std::int32_t part, const InkFieldLimits& limits);
 

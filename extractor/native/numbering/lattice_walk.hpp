@@ -1,8 +1,6 @@
 // Stage 7, the spin-search algorithm (SSA): walks from cell to cell around their common corners.
 #pragma once
 
-#include <tuple>
-
 #include "base/array.hpp"
 
 namespace cmp::numbering {
@@ -16,36 +14,32 @@ struct CellLinks {
   CMP_FIELDS(neighbours, back, misfit)
 };
 
-// The limits of inks at links; the Python module explains them.
+// The limits of inks at links (eq. 4: at most one cell of each ink at a marker).
 struct LinkInkLimits {
-  double likeness, least_difference;
-
-  template <class F>
-  static LinkInkLimits read(const F& f) {
-    return {f["likeness"], f["least_difference"]};
-  }
+  // of the difference between a neighbour and others of its class; it is of another class if it differs less
+  // from a cell of that. Chosen.
+  double likeness = 0.5;
+  // of the light of cells, between inks that can be told apart. Chosen.
+  double least_difference = 0.25;
 };
 
-// The limits of a walk; the Python module explains them.
+// The limits of a walk.
 struct WalkLimits {
-  std::int64_t max_rounds, min_hole_neighbours;
+  std::int64_t max_rounds = 6;  // walks, each without the cells contradicted before. Chosen.
+  // cells around a place without one; beside a straight rim there are two. Derived.
+  std::int64_t min_hole_neighbours = 3;
   LinkInkLimits inks;
-
-  template <class F>
-  static WalkLimits read(const F& f) {
-    return {f["max_rounds"], f["min_hole_neighbours"], f["inks"]};
-  }
 };
 
-// (N, 2) axial coordinates of the cells, (N,) the corner that is corner 0, (N,) the part, or -1 for a cell
-// without consistent links; the number of links that contradicted the walk, and of places without a cell
-// among the cells of the parts.
-//
-// Every part has a frame of its own. Corner 1 follows corner 0 clockwise in the image: the coordinates are
-// those of a pattern seen from its back.
-using Walked =
-    std::tuple<Array<std::int32_t, 2>, Array<std::int8_t, 1>, Array<std::int32_t, 1>, std::int64_t,
-               std::int64_t>;
+// The cells' places in the lattice; the Python class explains them.
+struct Walked {
+  Array<std::int32_t, 2> axial;  // (N, 2)
+  Array<std::int8_t, 1> first;   // (N,)
+  Array<std::int32_t, 1> part;   // (N,)
+  std::int64_t contradictions, holes;
+
+  CMP_RECORD("extractor.numbering.lattice_walk.Walk", axial, first, part, contradictions, holes)
+};
 
 // Walks over all linked cells, along links that the cells' light (N, 3), NaN unknown, does not contradict.
 Walked walk_cells(const CellLinks& links, View<const double, 2> light, const WalkLimits& limits);

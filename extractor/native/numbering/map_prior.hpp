@@ -5,16 +5,14 @@
 
 namespace cmp::numbering {
 
-// Lengths are in edges; a term of degree k has the unit edge per edge^k. Explained in witnesses.py.
-struct MapPrior {
-  double noise;      // standard deviation of a point
-  double quadratic;  // of the terms of degree 2
-  double cubic;      // of the terms of degree 3
-
-  CMP_FIELDS(noise, quadratic, cubic)
+// Lengths are in edges; a term of degree k has the unit edge per edge^k.
+struct MapPriorLimits {
+  double noise = 0.08;      // standard deviation of a cell's center. Chosen.
+  double quadratic = 0.05;  // of the terms of degree 2. Chosen.
+  double cubic = 0.01;      // of the terms of degree 3. Chosen.
 
   // of a map whose terms deviate by this share of the prior
-  localmap::MapRidge ridge(double share = 1.0) const {
+  localmap::MapRidge ridge(double share) const {
     const double square = noise / (share * quadratic), cube = noise / (share * cubic);
     return {.square = square * square, .mixed = square * square, .cubic = cube * cube};
   }

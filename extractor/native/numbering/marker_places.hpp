@@ -13,16 +13,23 @@ inline constexpr double AGREED_DEVIATION = 0.04;
 // In edges, between a marker's place by its gridlines and a correct initial place. Chosen.
 inline constexpr double MAX_PLACE_ERROR = 0.1;
 
-// Limits of corners; explained in extractor/numbering/marker_places.py.
+// Limits of corners.
 struct CornerLimits {
-  double max_corner_misfit, max_agreed_spread, predicted_weight;
-  double min_spread, max_triangle_misfit, min_rival_misfit;
-
-  template <class F>
-  static CornerLimits read(const F& f) {
-    return {f["max_corner_misfit"], f["max_agreed_spread"],   f["predicted_weight"],
-            f["min_spread"],        f["max_triangle_misfit"], f["min_rival_misfit"]};
-  }
+  // in edges, between a triangle's corner and its prediction by the cell's neighbours. Measured: rule "corner
+  // misfit".
+  double max_corner_misfit = 0.28;
+  // in the triangle's shortest edge, between a corner and the mean of its marker's corners, where these
+  // agree. Chosen.
+  double max_agreed_spread = 0.2;
+  // of a predicted corner, relative to a corner of a fitted triangle. Chosen.
+  double predicted_weight = 0.05;
+  // least ratio of a cell's neighbours' spread across to along; below it they lie on one line. Chosen.
+  double min_spread = 0.2;
+  // of the distance to a neighbour, from its center to the prediction by the cell's triangle. Measured: rule
+  // "mapped by triangle".
+  double max_triangle_misfit = 0.3;
+  // the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances. Chosen below that.
+  double min_rival_misfit = 0.8;
 };
 
 // The N cells of the image.
@@ -51,8 +58,14 @@ struct CornerAgreement {
       : agreed(agreeing == meeting || agreeing >= 2), is_intact(agreeing == meeting && agreeing >= 2) {}
 };
 
-// xy_px (M, 2), edge_px (M,), agreed (M,) and is_intact (M,) of InitialMarkers.
-using InitialMarkers = std::tuple<Array<double, 2>, Array<double, 1>, Array<bool, 1>, Array<bool, 1>>;
+// The markers before refinement; the Python class explains them.
+struct InitialMarkers {
+  Array<double, 2> xy_px;            // (M, 2)
+  Array<double, 1> edge_px;          // (M,)
+  Array<bool, 1> agreed, is_intact;  // (M,)
+
+  CMP_RECORD("extractor.numbering.marker_places.InitialMarkers", xy_px, edge_px, agreed, is_intact)
+};
 
 // The corners of the cells merged at each of `markers` markers; corner_ids (U, 3), the markers of the
 // layout's cells.

@@ -55,7 +55,7 @@ std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const do
     for (const std::int32_t v : known)
       map.add(layout.center_mm(v, 0), layout.center_mm(v, 1), center(image_cell[v], 0),
               center(image_cell[v], 1));
-    if (known.size() < 3 || !map.solve(limits.prior.ridge(), MIN_SPREAD)) continue;
+    if (known.size() < 3 || !map.solve(limits.prior.ridge(1.0), MIN_SPREAD)) continue;
     found.push_back(static_cast<std::int32_t>(u));
     for (int k = 0; k < 3; ++k) {
       for (const double place : map.at(layout.center_mm(u, 0) + layout.corner_vectors_mm(u, k, 0),

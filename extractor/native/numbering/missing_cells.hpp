@@ -9,15 +9,12 @@
 
 namespace cmp::numbering {
 
-// The limits of predictions; the Python module explains them.
+// The limits of predicted cells.
 struct MissingCellLimits {
-  MapPrior prior;
-  std::int64_t min_neighbours;
-
-  template <class F>
-  static MissingCellLimits read(const F& f) {
-    return {f["prior"], f["min_neighbours"]};
-  }
+  MapPriorLimits prior;  // of the map through the cells around
+  // numbered cells that share a corner with a predicted one; with those around them they determine a map.
+  // Chosen.
+  std::int64_t min_neighbours = 2;
 };
 
 // The layout's cells (K,) without a cell of the image that have enough neighbours with one, and their corners

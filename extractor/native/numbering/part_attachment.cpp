@@ -73,12 +73,13 @@ class Attachment {
  public:
   Attachment(const WalkedCells& cells, View<const double, 2> odds, const layout::LayoutCells& layout,
              View<const std::int32_t, 2> axial, View<const std::int32_t, 2> cell_lookup,
-             const AttachmentLimits& limits, View<std::int32_t, 1> cell)
+             bool with_single_cells, const AttachmentLimits& limits, View<std::int32_t, 1> cell)
       : cells_(cells),
         odds_(odds),
         layout_(layout),
         axial_(axial),
         cell_lookup_(cell_lookup),
+        with_single_cells_(with_single_cells),
         limits_(limits),
         cell_(cell),
         is_taken_({layout.ink.size()}, false),
@@ -102,7 +103,7 @@ class Attachment {
   // Places parts until none can be placed; single cells are placed where no larger part can be.
   void place_all() {
     for (std::int64_t round = 0; round < limits_.max_rounds; ++round)
-      if (!place_some(false) && !(limits_.with_single_cells && place_some(true))) return;
+      if (!place_some(false) && !(with_single_cells_ && place_some(true))) return;
   }
 
  private:
@@ -190,7 +191,7 @@ class Attachment {
       out.map.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
       out.stiff.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
     }
-    if (near.size() < 3 || !out.map.solve(limits_.prior.ridge(), MIN_SPREAD) ||
+    if (near.size() < 3 || !out.map.solve(limits_.prior.ridge(1.0), MIN_SPREAD) ||
         !out.stiff.solve(limits_.prior.ridge(limits_.stiffness), MIN_SPREAD))
       return std::nullopt;
     out.misfit = out.map.misfit();
@@ -260,7 +261,7 @@ class Attachment {
       map.add(layout_.center_mm(u, 0), layout_.center_mm(u, 1), x(i), y(i));
       score += odds_(i, layout_.ink[u] - 1);
     }
-    if (!map.solve(limits_.prior.ridge(), MIN_SPREAD)) return -1e9;
+    if (!map.solve(limits_.prior.ridge(1.0), MIN_SPREAD)) return -1e9;
     for (const Index i : judged) {
       const std::int32_t u = moved(i, motion);
       if (u >= 0 && !is_taken_[u] && !is_pointing(i, u, map, support.edge_px)) score += limits_.outside_odds;
@@ -290,6 +291,7 @@ class Attachment {
   View<const double, 2> odds_;
   const layout::LayoutCells& layout_;
   View<const std::int32_t, 2> axial_, cell_lookup_;
+  bool with_single_cells_;
   const AttachmentLimits& limits_;
   View<std::int32_t, 1> cell_;
   Array<bool, 1> is_taken_;
@@ -305,9 +307,12 @@ class Attachment {
 Array<std::int32_t, 1> attach_parts(const WalkedCells& cells, View<const std::int32_t, 1> cell,
                                     View<const double, 2> odds, const layout::LayoutCells& layout,
                                     View<const std::int32_t, 2> axial,
-                                    View<const std::int32_t, 2> cell_lookup, const AttachmentLimits& limits) {
+                                    View<const std::int32_t, 2> cell_lookup, bool with_single_cells,
+                                    const AttachmentLimits& limits) {
   Array<std::int32_t, 1> out(cell);
-  Attachment(cells, odds, layout, axial, cell_lookup, limits, out).place_all();
+  Attachment(cells, odds, layout, axial, cell_lookup, with_single_cells, limits, out).place_all();
+  for (Index i = 0; i < out.size(); ++i)
+    if (out[i] >= 0 && odds(i, layout.ink[out[i]] - 1) < limits.odd_ink) out[i] = -1;
   return out;
 }
 

@@ -157,11 +157,13 @@ Array<std::int32_t, 1> cells_beside(View<const std::int32_t, 2> axial,
   return out;
 }
 
-Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,
-                                   std::int32_t dr, View<const std::int32_t, 2> cell_lookup) {
-  Array<std::int32_t, 1> out({axial.size()});
-  for (Index i = 0; i < axial.size(); ++i) {
-    const AxialStep a = moved_up({axial(i, 0), axial(i, 1)}, {turn, dq, dr});
+Array<std::int32_t, 1> moved_cells(const WalkedCells& cells, std::int32_t part,
+                                   View<const std::int32_t, 1> motion,
+                                   View<const std::int32_t, 2> cell_lookup) {
+  Array<std::int32_t, 1> out({cells.part.size()}, -1);
+  for (Index i = 0; i < out.size(); ++i) {
+    if (cells.part[i] != part) continue;
+    const AxialStep a = moved_up({cells.axial(i, 0), cells.axial(i, 1)}, {motion[0], motion[1], motion[2]});
     out[i] = layout::cell_at(cell_lookup, a.q, a.r);
   }
   return out;

@@ -2,24 +2,19 @@
 // on.
 #pragma once
 
-#include <tuple>
-
 #include "base/array.hpp"
+#include "numbering/ink_fields.hpp"
 
 namespace cmp::numbering {
 
-// The weights of the witnesses; the Python module explains them.
+// The weights of the witnesses of a part's motion.
 struct WitnessLimits {
-  double outside_weight, max_outside_share;
-  std::int64_t min_outside;
-  double trimmed_share;
-  std::int64_t max_motions;
-
-  template <class F>
-  static WitnessLimits read(const F& f) {
-    return {f["outside_weight"], f["max_outside_share"], f["min_outside"], f["trimmed_share"],
-            f["max_motions"]};
-  }
+  double outside_weight = 3.0;     // log odds against a motion for each cell outside the layout. Chosen.
+  double max_outside_share = 0.1;  // of a part's cells outside the layout. Chosen.
+  std::int64_t min_outside = 3;    // cells outside the layout that any part may have. Chosen.
+  // of a part's cells at each end, without which it fits into the layout. Chosen.
+  double trimmed_share = 0.03;
+  std::int64_t max_motions = 100;  // the best ones, that are looked at. Chosen.
 };
 
 // The layouts of a family of pads as registration sees them: these differ in their white cells only.
@@ -32,11 +27,18 @@ struct RegisteredLayout {
   CMP_FIELDS(axial, white_axial, white_pad, cell_lookup)
 };
 
-// The K best motions, the best first: (K, 3) turn, dq and dr; (K,) the pad; scores (K,), log odds; white
-// (K,), the log odds of the white places alone; (K,) the number of the known ones of these; the best score of
-// all motions but the first without the log odds of their white places; and the number of all motions.
-using Motions = std::tuple<Array<std::int32_t, 2>, Array<std::int32_t, 1>, Array<double, 1>, Array<double, 1>,
-                           Array<std::int32_t, 1>, double, Index>;
+// The best motions of a part, the best first; the Python class explains them.
+struct Motions {
+  Array<std::int32_t, 2> motion;       // (K, 3)
+  Array<std::int32_t, 1> pad;          // (K,)
+  Array<double, 1> score, white;       // (K,)
+  Array<std::int32_t, 1> known_white;  // (K,)
+  double rival_without_white;
+  Index compared;
+
+  CMP_RECORD("extractor.numbering.registration.Motions", motion, pad, score, white, known_white,
+             rival_without_white, compared)
+};
 
 // Motions of a part's N cells: `turn` rotations by 120 degrees about marker 0, then a shift.
 //
@@ -51,8 +53,9 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
 Array<std::int32_t, 1> cells_beside(View<const std::int32_t, 2> axial,
                                     View<const std::int32_t, 2> down_axial);
 
-// (N,) the layout's cell of each cell (N, 2) after a motion, or -1.
-Array<std::int32_t, 1> moved_cells(View<const std::int32_t, 2> axial, std::int32_t turn, std::int32_t dq,
-                                   std::int32_t dr, View<const std::int32_t, 2> cell_lookup);
+// (N,) the layout's cell of each cell of a part after a motion (3,), or -1; -1 for cells of other parts.
+Array<std::int32_t, 1> moved_cells(const WalkedCells& cells, std::int32_t part,
+                                   View<const std::int32_t, 1> motion,
+                                   View<const std::int32_t, 2> cell_lookup);
 
 }  // namespace cmp::numbering
