@@ -52,7 +52,9 @@ SHORT_RARITY = 30  # one in so many gridlines may be shorter than MIN_EDGE_PX at
 MIN_EDGE_PX = 4.0  # edges at a reduced scale; where blur makes one edge part of the next,
 MIN_BLURRED_EDGE_PX = 6.5  # either these
 MIN_BLUR_PX = 0.65  # or that blur; chosen, as the two before
-RELIEF_POINTS = 3  # on each gridline, by which the parallax of cells is found; chosen
+RELIEF_POINTS = (
+    3  # on each gridline of a layout without virtual markers, to find the parallax of cells; chosen
+)
 
 
 class Refiner:
@@ -62,7 +64,8 @@ class Refiner:
         self._topology = topology
         self._virtual = virtual_per_edge
         self._schedule = SCHEDULES[preset]
-        self._synthesis_solver = SynthesisSolver(topology)
+        stations = virtual_per_edge or (RELIEF_POINTS if topology.cell_height != 0.0 else 0)
+        self._synthesis_solver = SynthesisSolver(topology, stations)
         markers, edges = len(topology.spokes), len(topology.edges)
         self._unmeasured: dict[str, Any] = {
             "information": Information(np.zeros((markers, 3)), np.zeros((edges, 4))),
@@ -212,16 +215,15 @@ class Refiner:
         """The markers at the image's full scale. A lost marker on which all triangles agree lies where these put it."""
         scale, reading = view.scale, estimate.reading
         assert reading is not None
-        picture = self._synthesis_solver.picture(view.image.shape)
-        points = measure_virtual_markers(view, picture, reading, self._virtual)
+        points = measure_virtual_markers(view, reading)
         xy, cov = native.at_full_scale(xy, cov, places, scale)
         parallax = None
         if self._topology.cell_height != 0.0:
-            beside = measure_virtual_markers(view, picture, reading, RELIEF_POINTS)[..., :2]
             size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
-            parallax = find_parallax(self._topology, xy, beside, size_px)
+            parallax = find_parallax(self._topology, xy, points[..., :2], size_px)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look, parallax)
+        points = points[:, : self._virtual]
         blur, noise = scale * estimate.sigma, scale * estimate.noise
         return RefinedMarkers(
             xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)

@@ -68,10 +68,15 @@ class SynthesisSolver:
     """Takes steps by synthesis. The picture that it draws is kept from image to image, one for each thread.
 
     Copies and pickles have no picture; they draw their own.
+
+    Args:
+        topology: of the layout.
+        stations: points of each gridline at which drawing and image are compared, too.
     """
 
-    def __init__(self, topology: Topology) -> None:
+    def __init__(self, topology: Topology, stations: int) -> None:
         self._topology = topology
+        self._stations = stations
         self._no_shift = np.full((len(topology.spokes), 2), np.nan)
         self._kept = threading.local()
 
@@ -83,7 +88,7 @@ class SynthesisSolver:
         self.__dict__.update(state)
         self._kept = threading.local()
 
-    def picture(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    def _picture(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
         """(H, W, 3) the thread's picture of a shape: the light of the pattern over black, from the last drawing."""
         kept: dict[tuple[int, ...], NDArray[np.float32]] | None = getattr(self._kept, "pictures", None)
         if kept is None:
@@ -128,8 +133,8 @@ class SynthesisSolver:
 
     def _full_step(self, view: PyramidLevel, estimate: Estimate) -> tuple[Estimate, SynthesisStep]:
         """A step from all measurements: the pattern is drawn, compared with the image, and solved for."""
-        picture = self.picture(view.image.shape)
-        step = native.synthesis_step(view, self._topology, picture, estimate, estimate.levels)
+        picture = self._picture(view.image.shape)
+        step = native.synthesis_step(view, self._topology, picture, estimate, estimate.levels, self._stations)
         after = with_solution(
             estimate,
             step.solution,

@@ -15,7 +15,7 @@ struct TriangleEdgeLimits {
   double border_margin_px = 0.01;
   // half length of a profile, in vectors from the cell's center to the edge's middle. Chosen: a second pass
   // with shorter profiles lost more markers and made no picture more accurate.
-  double profile_reach = 0.5;
+  double profile_reach = 0.55;
   // of the disc in which the ink's color is measured, relative to the corner's distance from the center.
   // Chosen.
   double ink_radius = 0.2;

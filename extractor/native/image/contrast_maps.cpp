@@ -142,7 +142,10 @@ ContrastMap contrast_map(View<const std::uint8_t, 3> channels, Index number, Ind
   const Index rows = (height + tile_px - 1) / tile_px, columns = (width + tile_px - 1) / tile_px;
   ContrastMap out{Array<std::uint8_t, 2>({height, width}), Array<float, 2>({rows, columns}),
                   Array<float, 2>({rows, columns}), tile_px};
-  fill_mixed(channels[0].flat(), channels[1].flat(), channels[2].flat(), MIXES[number], out.value.flat());
+  if (number < CHANNELS)
+    copy<std::uint8_t, 2>(channels[number], out.value);
+  else
+    fill_mixed(channels[0].flat(), channels[1].flat(), channels[2].flat(), MIXES[number], out.value.flat());
   fill_tile_levels(out.value, tile_px, out.low, out.high);
   const auto as_is = [](float value, float) { return value; };
   const auto sum = [](float a, float b) { return a + b; };

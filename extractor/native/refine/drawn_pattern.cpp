@@ -3,7 +3,6 @@
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/synthesis/gridline_sides.hpp"
 #include "refine/synthesis/pattern_drawing.hpp"
-#include "refine/synthesis/residual_kernel.hpp"
 
 namespace cmp::refine {
 
@@ -49,7 +48,7 @@ Array<double, N> change(View<const double, N> now, View<const double, N> before,
 
 DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topology& topology,
                           View<float, 3> picture, const PatternState& state, const InkLevels& levels,
-                          View<const std::int64_t, 1> box, const DrawingLimits& limits) {
+                          View<const std::int64_t, 1> box, Index stations, const DrawingLimits& limits) {
   const auto xy = state.xy;
   const auto cells = topology.cells, edges = topology.edges, edge_cells = topology.edge_cells;
   const double sigma = state.sigma;
@@ -72,8 +71,8 @@ DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topolog
       beside.light({change<2>(wider_cell, levels.cell, step), change<3>(wider_slope, levels.slope, step),
                     change<2>(wider_black, levels.black, step), levels.is_outlier});
   const Array<bool, 1> bending = bending_gridlines(state.roughness, state.bend, edges);
-  Array<double, 2> sums =
-      accumulate_residual_sums(view, picture, {lines, sides, added, bleed, bending}, sigma, box, limits.rows);
+  ResidualSums sums = accumulate_residual_sums(view, picture, {lines, sides, added, bleed, bending}, sigma,
+                                               box, stations, limits.rows);
   Array<double, 2> contrasts = value_contrasts(sides, view.response.encoded);
   const double edge_px = median_edge(xy, edges, limits.weights);
   return {std::move(lines),     std::move(sides), std::move(contrasts), std::move(added), std::move(sums),

@@ -12,6 +12,7 @@
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/ink_levels.hpp"
 #include "refine/synthesis/pixel_rows.hpp"
+#include "refine/synthesis/residual_kernel.hpp"
 
 namespace cmp::refine {
 
@@ -33,15 +34,15 @@ struct DrawnPattern {
   Array<double, 2> sides;      // (E, 6) the light on both sides, as GridlineSides gives it
   Array<double, 2> contrasts;  // (E, 3) as value_contrasts gives them
   Array<double, 2> added;      // (E, 6) the light to add on both sides
-  Array<double, 2> sums;       // (E, 24) as accumulate_residual_sums gives them
+  ResidualSums sums;           // as accumulate_residual_sums gives them
   LevelArrays corrected;       // the levels, by the residual in the middles of the cells
   double edge_px;              // the median length of the gridlines
 };
 
 // Draws the pattern with the levels of its inks into the box (4,) of the picture (H, W, 3), and compares the
-// two.
+// two; also at `stations` stations of each gridline.
 DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topology& topology,
                           View<float, 3> picture, const PatternState& state, const InkLevels& levels,
-                          View<const std::int64_t, 1> box, const DrawingLimits& limits);
+                          View<const std::int64_t, 1> box, Index stations, const DrawingLimits& limits);
 
 }  // namespace cmp::refine

@@ -8,11 +8,12 @@ namespace cmp::refine {
 
 SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topology& topology,
                              View<float, 3> picture, const PatternState& state, const InkLevels& levels,
-                             const SynthesisLimits& limits) {
+                             Index stations, const SynthesisLimits& limits) {
   const double sigma = state.sigma, margin = limits.drawing.margin_sigma * sigma + limits.drawing.margin_px;
   const Array<std::int64_t, 1> box = pattern_box(state.xy, margin, view.image.size(1), view.image.size(0));
-  auto [lines, sides, contrasts, added, sums, corrected, edge_px] =
-      draw_pattern(view, topology, picture, state, levels, box, limits.drawing);
+  auto [lines, sides, contrasts, added, read, corrected, edge_px] =
+      draw_pattern(view, topology, picture, state, levels, box, stations, limits.drawing);
+  Array<double, 2>& sums = read.ends;
   const auto edges = topology.edges, edge_cells = topology.edge_cells;
   const auto& rule = limits.rule;
   const auto& weights = limits.step.weights;
@@ -41,7 +42,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
                                      sigma, blur_px, limits.drawing.bleed);
   ReadGridlines reading{std::move(lines),
                         std::move(sides),
-                        std::move(added),
+                        std::move(read.stations),
                         std::move(weighed.weight),
                         std::move(solved.variance_ratio),
                         std::move(dot_gain_offset),

@@ -21,11 +21,12 @@ struct SynthesisLimits {
 };
 
 struct ReadGridlines {
-  Array<double, 2> lines, sides, added;                      // (E, 8), (E, 6), (E, 6)
+  Array<double, 2> lines, sides;                             // (E, 8), (E, 6)
+  Array<double, 3> station_sums;                             // (E, m, 2)
   Array<double, 1> weight, variance_ratio, dot_gain_offset;  // (E,)
   double sigma, noise;                                       // px; gray levels
 
-  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, added, weight,
+  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, station_sums, weight,
              variance_ratio, dot_gain_offset, sigma, noise)
 };
 
@@ -42,9 +43,10 @@ struct SynthesisStep {
              sigma, levels, is_read, edge_px)
 };
 
-// Draws the pattern into the picture (H, W, 3), compares it with the image, and solves for the markers.
+// Draws the pattern into the picture (H, W, 3), compares it with the image, also at `stations` stations of
+// each gridline, and solves for the markers.
 SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topology& topology,
                              View<float, 3> picture, const PatternState& state, const InkLevels& levels,
-                             const SynthesisLimits& limits);
+                             Index stations, const SynthesisLimits& limits);
 
 }  // namespace cmp::refine

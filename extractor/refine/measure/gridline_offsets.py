@@ -22,7 +22,7 @@ class GridlineReading(NamedTuple):
     Attributes:
         lines: (E, 8), as ``gridlines`` gives them.
         sides: (E, 6), the light on both sides, as ``GridlineSides`` gives it.
-        added: (E, 6), the light to add to the drawing on both sides.
+        station_sums: (E, m, 2), of the pixels around each virtual marker, the weighted residual and the information.
         weight: (E,) 0 to 1.
         variance_ratio: (E,), as ``variance_ratios`` gives it.
         dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
@@ -32,7 +32,7 @@ class GridlineReading(NamedTuple):
 
     lines: NDArray[np.float64]
     sides: NDArray[np.float64]
-    added: NDArray[np.float64]
+    station_sums: NDArray[np.float64]
     weight: NDArray[np.float64]
     variance_ratio: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
@@ -40,21 +40,15 @@ class GridlineReading(NamedTuple):
     noise: float
 
 
-def measure_virtual_markers(
-    view: PyramidLevel, model: NDArray[np.float32], reading: GridlineReading, count: int
-) -> NDArray[np.float64]:
+def measure_virtual_markers(view: PyramidLevel, reading: GridlineReading) -> NDArray[np.float64]:
     """The virtual markers measured in the image.
 
     Args:
         view: the image.
-        model: (H, W, 3), the light of the drawn pattern.
         reading: of the same image.
-        count: m, the virtual markers of a gridline.
 
     Returns:
         (E, m, 3): x and y, px at full scale, and the variance across the gridline, px^2; NaN where not measured.
     """
-    if count == 0:
-        return np.empty((len(reading.lines), 0, 3))
-    offsets = native.measure_offsets(view, model, reading, count)
+    offsets = native.measure_offsets(view, reading)
     return native.virtual_markers(reading.lines, offsets, view.scale)

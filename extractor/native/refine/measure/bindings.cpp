@@ -10,7 +10,7 @@ namespace cmp::refine {
 
 void add_measure(nb::module_ module) {
   bind<&measure_scatter>(module, "measure_scatter", {"xy", "maps", "diagonal", "topology"});
-  bind<&measure_offsets>(module, "measure_offsets", {"view", "model", "reading", "count"});
+  bind<&measure_offsets>(module, "measure_offsets", {"view", "reading"});
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
   bind<&short_edge>(module, "short_edge", {"xy", "edges", "rarity"});
   bind<&markers_without_dot_gain>(module, "markers_without_dot_gain", {"xy", "cells", "dot_gain"});

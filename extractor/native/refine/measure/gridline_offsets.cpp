@@ -2,15 +2,13 @@
 
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <vector>
 
 #include "numeric/median.hpp"
 #include "refine/measure/matched_filter.hpp"
-#include "refine/measure/station_pixels.hpp"
 #include "refine/synthesis/gridline_sides.hpp"
 #include "refine/synthesis/gridlines.hpp"
-#include "refine/synthesis/pixel_rows.hpp"
+#include "refine/synthesis/station_sums.hpp"
 
 namespace cmp::refine {
 
@@ -18,59 +16,6 @@ namespace {
 
 constexpr Index OFFSET = 0, VARIANCE = 1, COLORS = 3;
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
-
-// Memory for the pixels of one gridline.
-struct OffsetBuffers {
-  BlockRows rows;
-  Residuals residuals;
-  StationPixels pixels;
-};
-
-// The sums at a station: of the weighted residuals, and of the information.
-struct StationTotal {
-  double residual, information;
-};
-
-// The gridlines that are measured, and what they are compared with.
-struct Comparison {
-  ComparedImages images;
-  Index width, height;
-  GridlineReading reading;
-  double band;  // in units of the blur
-};
-
-// Fills in the sums at the stations of gridline e.
-void fill_station_sums(const Comparison& compared, Index e, OffsetBuffers& buffers,
-                       std::vector<StationTotal>& sums) {
-  const GridlineReading& reading = compared.reading;
-  const SideLight light = side_light(reading.sides, reading.added, e);
-  const RowFrame frame = row_frame(reading.lines, e, {0, 0, compared.width, compared.height}, compared.width);
-  const PixelGeometry line = pixel_geometry(frame, reading.sigma);
-  const double reach = compared.band * reading.sigma, intervals = static_cast<double>(sums.size()) + 1.0;
-  // the pixels of the first and of the last station reach half an interval beyond these
-  const double from_p = frame.p + (0.5 / intervals) * frame.length * frame.up;
-  const double to_p = frame.p + (1.0 - 0.5 / intervals) * frame.length * frame.up;
-  const double slack = reach * std::abs(frame.uq), half = reach / std::abs(frame.up);
-  const auto begin = std::max<Index>(static_cast<Index>(std::ceil(std::min(from_p, to_p) - slack)), 0);
-  const Index last =
-      std::min(static_cast<Index>(std::floor(std::max(from_p, to_p) + slack)), frame.p_count - 1);
-  const auto [wide, most] = row_sizes(half, frame.q_count);
-  std::fill(sums.begin(), sums.end(), StationTotal{0.0, 0.0});
-  for (Index first = begin; first <= last; first += most) {
-    const RowBlock block{std::min(most, last + 1 - first), wide, frame.step_q};
-    fill_rows(block, first, frame, half, buffers.rows);
-    fill_stations(buffers.rows, block, line, static_cast<float>(intervals), static_cast<float>(compared.band),
-                  buffers.pixels);
-    fill_residuals(compared.images, block, buffers.rows, light, buffers.pixels.before_share,
-                   buffers.residuals);
-    for (std::size_t j = 0; j < sums.size(); ++j) {
-      const auto own =
-          sums_at_station(buffers.pixels, buffers.residuals, block.pixels(), static_cast<float>(j));
-      sums[j].residual += own.residual;
-      sums[j].information += own.information;
-    }
-  }
-}
 
 // The color in which gridline e has the largest contrast (3,), and 1 or -1 by the side that is brighter.
 struct InkSide {
@@ -118,29 +63,22 @@ void update_without_profiles(View<double, 3> offsets, View<const double, 2> cont
 
 }  // namespace
 
-Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const float, 3> model,
-                                 const GridlineReading& reading, Index count, const OffsetLimits& limits) {
+Array<double, 3> measure_offsets(const image::PyramidLevel& view, const GridlineReading& reading,
+                                 const OffsetLimits& limits) {
   const View<const double, 2> lines = reading.lines;
+  const auto sums = reading.station_sums;
   const auto contrasts = value_contrasts(reading.sides, view.response.encoded);
-  const Comparison compared{{view.image.flat(), model.flat(), view.response.encoded},
-                            view.image.size(1),
-                            view.image.size(0),
-                            reading,
-                            limits.band};
-  Array<double, 3> out({lines.size(), count, 2}, NONE);
-  // every pixel that is read is written before, but those of lanes without a row
-  const auto buffers = std::make_unique<OffsetBuffers>();
-  std::vector<StationTotal> sums(static_cast<std::size_t>(count));
+  Array<double, 3> out({lines.size(), sums.size(1), 2}, NONE);
   for (Index e = 0; e < lines.size(); ++e) {
     const auto contrast = contrasts[e];
     const double strength = contrast[0] * contrast[0] + contrast[1] * contrast[1] + contrast[2] * contrast[2];
     if (lines(e, KNOWN) == 0.0 || strength == 0.0 || reading.weight[e] < limits.min_offset_weight) continue;
-    fill_station_sums(compared, e, *buffers, sums);
-    for (Index j = 0; j < count; ++j) {
-      const auto [residual, information] = sums[static_cast<std::size_t>(j)];
+    for (Index j = 0; j < sums.size(1); ++j) {
+      const double information = sums(e, j, STATION_INFORMATION);
       if (information < limits.min_weight_sum * strength) continue;
       const double variance = reading.variance_ratio[e] * (reading.noise * reading.noise);
-      out(e, j, OFFSET) = reading.sigma * residual / information - reading.dot_gain_offset[e];
+      out(e, j, OFFSET) =
+          reading.sigma * sums(e, j, STATION_RESIDUAL) / information - reading.dot_gain_offset[e];
       out(e, j, VARIANCE) = variance * (reading.sigma * reading.sigma) / information;
     }
   }

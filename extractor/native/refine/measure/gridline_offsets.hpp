@@ -4,7 +4,6 @@
 
 #include "base/array.hpp"
 #include "image/pyramid.hpp"
-#include "refine/synthesis/pixel_rows.hpp"
 
 namespace cmp::refine {
 
@@ -13,9 +12,6 @@ struct OffsetLimits {
   // of the squared weights of pixels at a virtual marker, in units of the squared contrast. Chosen.
   double min_weight_sum = 0.08;
   double min_offset_weight = 0.4;  // of a gridline, for its offsets to be measured. Chosen.
-  // in units of the blur, the distance from a gridline within which pixels count. Derived: as in
-  // PixelRowLimits.
-  double band = PixelRowLimits{}.band;
   // of an ink; with no more, its profile is taken as 0. Chosen, as for the dot gain.
   Index min_profile_gridlines = 40;
 };
@@ -24,24 +20,23 @@ struct OffsetLimits {
 struct GridlineReading {
   View<const double, 2> lines;            // (E, 8), as gridlines gives them
   View<const double, 2> sides;            // (E, 6), the light on both sides, as GridlineSides gives it
-  View<const double, 2> added;            // (E, 6), the light to add to the drawing
+  View<const double, 3> station_sums;     // (E, m, 2), as accumulate_station_sums gives them
   View<const double, 1> weight;           // (E,) 0 to 1
   View<const double, 1> variance_ratio;   // (E,), as variance_ratios gives it
   View<const double, 1> dot_gain_offset;  // (E,) px, the shift of the gridline towards (-uy, ux) by dot gain
   double sigma;                           // px, the blur
   double noise;                           // gray levels
 
-  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, added, weight,
+  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, station_sums, weight,
              variance_ratio, dot_gain_offset, sigma, noise)
 };
 
-// The offsets of the gridlines around their virtual markers, count of each gridline.
+// The offsets of the gridlines around their m virtual markers.
 //
-// model (H, W, 3), the light of the drawn pattern.
-// (E, count, 2): px, the offset towards (-uy, ux) less that of dot gain and of the ink's profile; px^2, its
+// (E, m, 2): px, the offset towards (-uy, ux) less that of dot gain and of the ink's profile; px^2, its
 // variance. NaN where the gridline has no contrast or little weight or leaves the image.
-Array<double, 3> measure_offsets(const image::PyramidLevel& view, View<const float, 3> model,
-                                 const GridlineReading& reading, Index count, const OffsetLimits& limits);
+Array<double, 3> measure_offsets(const image::PyramidLevel& view, const GridlineReading& reading,
+                                 const OffsetLimits& limits);
 
 // (E, m, 3) x and y, px at full scale, and the variance across the gridline, px^2.
 //

@@ -35,6 +35,7 @@ struct GridlinePixels {
   PixelWeights weights;
   Residuals residuals;
   PixelColumn blur_cross;  // the products of the derivatives by the share of the light and by the blur
+  PixelColumn station;     // the number of the station that a pixel belongs to
 };
 
 // How far the weights of a gridline reach.

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "refine/synthesis/residual_sums.hpp"
+#include "refine/synthesis/station_sums.hpp"
 
 namespace cmp::refine {
 
@@ -30,9 +31,10 @@ class ResidualReader {
     images_ = {view.image.flat().from(start), model.flat().from(start), view.response.encoded};
   }
 
-  // Fills in the sums (24,) over the pixels near gridline e.
-  void read(Index e, View<double, 1> sums) {
+  // Fills in the sums (24,) over the pixels near gridline e, and those at its stations (m, 2).
+  void read(Index e, View<double, 1> sums, View<double, 2> stations) {
     sums.fill(0.0);
+    stations.flat().fill(0.0);
     const SideLight light = side_light(drawn_.sides, drawn_.added, e);
     const auto [c0, c1, c2] = light.contrast;
     if (drawn_.lines(e, KNOWN) == 0.0 || c0 * c0 + c1 * c1 + c2 * c2 == 0.0F) return;
@@ -52,6 +54,7 @@ class ResidualReader {
       fill_values(images_, block, pixels_.rows, light, pixels_.weights.before_share, pixels_.residuals);
       accumulate_sums(light, bleed, block.pixels(), pixels_, sums);
       if (drawn_.is_bending[e]) accumulate_bending_sums(pixels_, block.pixels(), sums);
+      accumulate_station_sums(block, line, pixels_, stations);
     }
     update_units(sums, 1.0 / sigma_);
   }
@@ -79,13 +82,15 @@ void fill_zeros(View<float, 3> model, View<const std::int64_t, 1> box) {
   for (Index y = box[1]; y < box[3]; ++y) model[y].slice(box[0], box[2]).flat().fill(0.0F);
 }
 
-Array<double, 2> accumulate_residual_sums(const image::PyramidLevel& view, View<const float, 3> model,
-                                          const DrawnGridlines& drawn, double sigma,
-                                          View<const std::int64_t, 1> box, const PixelRowLimits& limits) {
-  Array<double, 2> sums({drawn.lines.size(), SUMS});
+ResidualSums accumulate_residual_sums(const image::PyramidLevel& view, View<const float, 3> model,
+                                      const DrawnGridlines& drawn, double sigma,
+                                      View<const std::int64_t, 1> box, Index stations,
+                                      const PixelRowLimits& limits) {
+  const Index edges = drawn.lines.size();
+  ResidualSums out{Array<double, 2>({edges, SUMS}), Array<double, 3>({edges, stations, STATION_SUMS})};
   ResidualReader reader(view, model, drawn, sigma, box, limits);
-  for (Index e = 0; e < drawn.lines.size(); ++e) reader.read(e, sums[e]);
-  return sums;
+  for (Index e = 0; e < edges; ++e) reader.read(e, out.ends[e], out.stations[e]);
+  return out;
 }
 
 }  // namespace cmp::refine

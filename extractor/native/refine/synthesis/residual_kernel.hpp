@@ -29,10 +29,17 @@ struct DrawnGridlines {
   View<const bool, 1> is_bending;  // (E,), gridlines with two more unknowns for their bending
 };
 
+// The sums along gridlines.
+struct ResidualSums {
+  Array<double, 2> ends;  // (E, 24), by the offsets of both ends; the columns are named above
+  Array<double, 3>
+      stations;  // (E, m, 2), at the stations of each gridline, as accumulate_station_sums gives them
+};
+
 // Fills the box (x from, y from, x to, y to; px) of an image (H, W, 3) with zeros.
 void fill_zeros(View<float, 3> model, View<const std::int64_t, 1> box);
 
-// (E, 24) sums over the pixels near each gridline; the columns are named above.
+// The sums over the pixels near each gridline, and around `stations` stations of each.
 //
 // model (H, W, 3), the light of the drawn pattern over black; sigma px, the blur; box (4,) px, x from, y
 // from, x to, y to: the drawn part of the image. AA, AB, BB: squared derivatives of the drawing's values by
@@ -40,8 +47,9 @@ void fill_zeros(View<float, 3> model, View<const std::int64_t, 1> box);
 // MISFIT: squared residual of PIXELS; BLUR: residual times the derivative by sigma; BLUR_CURVATURE, A_BLUR,
 // B_BLUR: that derivative squared, and times those by the offsets. C and D are the same for the bending of
 // gridlines that bend, 0 elsewhere.
-Array<double, 2> accumulate_residual_sums(const image::PyramidLevel& view, View<const float, 3> model,
-                                          const DrawnGridlines& drawn, double sigma,
-                                          View<const std::int64_t, 1> box, const PixelRowLimits& limits);
+ResidualSums accumulate_residual_sums(const image::PyramidLevel& view, View<const float, 3> model,
+                                      const DrawnGridlines& drawn, double sigma,
+                                      View<const std::int64_t, 1> box, Index stations,
+                                      const PixelRowLimits& limits);
 
 }  // namespace cmp::refine
