@@ -33,6 +33,8 @@ class NumberedTriangles(NamedTuple):
         """The cells with measured corners (N, 3, 2), NaN where there are none; predicted cells need them."""
         kept = np.isfinite(corner_px[:, 0, 0])
         kept[: self.found] = True
+        if kept.all():
+            return self._replace(corner_px=corner_px)
         return NumberedTriangles(
             self.center_px[kept], corner_px[kept], self.cell[kept], self.mirrored, self.found
         )
@@ -48,13 +50,21 @@ def with_missing_cells(
         numbering: their numbers.
         lattice: the layout.
     """
-    known = numbering.cell >= 0
+    known = np.flatnonzero(numbering.cell >= 0)
     corners, cell = corner_px[known], numbering.cell[known]
-    center = np.ascontiguousarray(corners.mean(axis=1))
+    center = _centers(corners)
     found, predicted = native.missing_cells(center, cell, lattice.layout_cells)
     if not numbering.mirrored:  # the layout's order is clockwise in images of the back
         predicted = predicted[:, ::-1]
-    corners = np.concatenate([corners, predicted])
     return NumberedTriangles(
-        corners.mean(axis=1), corners, np.concatenate([cell, found]), numbering.mirrored, len(cell)
+        np.concatenate([center, _centers(predicted)]),
+        np.concatenate([corners, predicted]),
+        np.concatenate([cell, found]),
+        numbering.mirrored,
+        len(cell),
     )
+
+
+def _centers(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 2) the centers of triangles (N, 3, 2); ``mean`` takes five times as long."""
+    return (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0

@@ -380,14 +380,16 @@ class Registration:
         """The numbers of all cells by the part whose motion is certain; none if the other parts contradict the
         motion."""
         cell = self._placed_cells(placed, 0)
-        sizes = np.array([[one.is_own.sum(), (cell[one.is_own] >= 0).sum()] for one in parts])
-        count, numbered = sizes.sum(axis=0)
-        if numbered < MIN_NUMBERED_SHARE * count:
+        is_numbered = cell >= 0
+        own = [one.is_own for one in parts]
+        count = sum(np.count_nonzero(one) for one in own)
+        numbered = [np.count_nonzero(is_numbered & one) for one in own]
+        if sum(numbered) < MIN_NUMBERED_SHARE * count:
             first = next(one for one in parts if one.seen.part == placed.seen.part)
             again = self._with_all_parts(first, len(first.motions.score))
             if not again or not again[0].has_motion_of(placed):
                 return None
-        others = [one for one, own in zip(parts, sizes, strict=True) if own[1] == 0]
+        others = [one for one, found in zip(parts, numbered, strict=True) if found == 0]
         if any(one.is_certain and one.motions.white[0] > 0.0 for one in others):
             return Refusal(Reason.SEVERAL_PADS, placed.seen.fields)
         white = float(placed.motions.white[0])

@@ -89,7 +89,8 @@ class Walk {
         blocked_(blocked),
         axial_({blocked.size(), 2}, UNKNOWN_AXIAL),
         first_({blocked.size()}, std::int8_t{0}),
-        part_({blocked.size()}, -1) {
+        part_({blocked.size()}, -1),
+        best_(static_cast<std::size_t>(blocked.size()), Reached{0.0, -1, {0, 0}, 0}) {
     taken_.reserve(static_cast<std::size_t>(blocked.size()));
   }
 
@@ -146,10 +147,17 @@ class Walk {
         const AxialStep step = AXIAL_STEPS[j][here.first];
         const int first = first_corner(links_.back(here.cell, j), {-step.q, -step.r});
         if (first < 0) continue;
-        waiting.push({std::max(here.misfit, links_.misfit(here.cell, j)),
-                      to,
-                      {here.place.q + step.q, here.place.r + step.r},
-                      first});
+        const Reached next{std::max(here.misfit, links_.misfit(here.cell, j)),
+                           to,
+                           {here.place.q + step.q, here.place.r + step.r},
+                           first};
+        // a worse link to the same place changes nothing
+        Reached& best = best_[static_cast<std::size_t>(to)];
+        if (best.cell == parts_ && best.place == next.place && best.first == first &&
+            best.misfit <= next.misfit)
+          continue;
+        if (best.cell != parts_ || next.misfit < best.misfit) best = {next.misfit, parts_, next.place, first};
+        waiting.push(next);
       }
     }
     ++parts_;
@@ -173,6 +181,7 @@ class Walk {
   Array<std::int32_t, 2> axial_;
   Array<std::int8_t, 1> first_;
   Array<std::int32_t, 1> part_;
+  std::vector<Reached> best_;  // how each cell can be reached; `cell` is the part from which
   std::unordered_set<std::uint64_t> taken_;
   std::int32_t parts_ = 0;
 };
