@@ -47,24 +47,24 @@ class Threshold(NamedTuple):
     @property
     def line(self) -> str:
         """The line of the file that sets it, without the number."""
-        return f"    {self.field}: float = "
+        return f"  double {self.field} = "
 
     def own_value(self) -> float:
         """The reader's own value."""
         text = (ROOT / self.file).read_text(encoding="utf-8")
-        found = re.findall(rf"^{re.escape(self.line)}([\d.]+)$", text, re.MULTILINE)
+        found = re.findall(rf"^{re.escape(self.line)}([\d.]+);$", text, re.MULTILINE)
         if len(found) != 1:
             raise ValueError(f"{self.file}: {self.field} is set {len(found)} times, not once")
         return float(found[0])
 
     def change(self, value: float) -> Replacement:
         """What gives the reader another value."""
-        return Replacement(self.file, f"{self.line}{self.own_value():g}\n", f"{self.line}{value:g}\n")
+        return Replacement(self.file, f"{self.line}{self.own_value():g};\n", f"{self.line}{value:g};\n")
 
 
 THRESHOLDS = {
     "max_distance": Threshold(
-        "extractor/complete/consistency_filter.py", "max_distance", (0.06, 0.1, 0.25, 0.4, 1.0)
+        "extractor/native/complete/consistency_filter.hpp", "max_distance", (0.06, 0.1, 0.25, 0.4, 1.0)
     ),
 }
 

@@ -15,23 +15,6 @@ from numpy.typing import NDArray
 from extractor._native import complete as native
 
 
-class LayerLimits(NamedTuple):
-    """Limits of the quadratics through layers.
-
-    Attributes:
-        min_markers: known markers of a layer within a sextant, for a quadratic with a residual. Derived: three
-            coefficients, and two equations over.
-        picture_freedom: degrees of freedom by which the residuals of all quadratics of the picture count beside those
-            of one. Chosen: as many as a quadratic through the fewest markers has.
-    """
-
-    min_markers: int = 5
-    picture_freedom: float = 4.0
-
-
-LIMITS = LayerLimits()
-
-
 class LayerPlaces(NamedTuple):
     """Places of M markers on the quadratics through their layers and sextants.
 
@@ -56,4 +39,4 @@ def predict_by_layer(xy: NDArray[np.float64], noise_px2: NDArray[np.float64], la
         noise_px2: (M,) the variances of the known ones, per axis.
         layers: number of layers.
     """
-    return LayerPlaces(*native.predict_by_layer(np.ascontiguousarray(xy), noise_px2, layers, LIMITS))
+    return native.predict_by_layer(np.ascontiguousarray(xy), noise_px2, layers)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,24 +16,6 @@ RING_STEPS = np.array(
 FIRST_RING = np.flatnonzero([max(abs(q), abs(r), abs(q + r)) == 1 for q, r in RING_STEPS])  # (6,)
 
 
-class NeighbourMapLimits(NamedTuple):
-    """Limits of maps through the markers around a marker.
-
-    Attributes:
-        min_spread: least ratio of the neighbours' spread across to along; below it they lie on one line. Chosen.
-        min_linear_neighbours: markers; fewer give no map. Derived: three coefficients, and one equation over.
-        min_quadratic_neighbours: markers; fewer give the linear map. Derived: six coefficients, and three equations
-            over.
-    """
-
-    min_spread: float = 1e-3
-    min_linear_neighbours: int = 4
-    min_quadratic_neighbours: int = 9
-
-
-LIMITS = NeighbourMapLimits()
-
-
 def neighbour_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
     """(M, 18) int32, the ids of the markers in the two rings around each marker at (M, 2); -1 outside the pattern."""
     return native.neighbour_ids(axial, RING_STEPS, layers)
@@ -45,7 +25,7 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     """(M, 18) float64 weights of the neighbours ``table`` (M, 18) whose weighted sum is a marker's place.
 
     The weights are those of the least-squares map of ``predict_markers`` with all neighbours known: quadratic, or
-    linear below ``min_quadratic_neighbours``. They are 0 where the neighbours are too few.
+    linear with few neighbours. They are 0 where the neighbours are too few.
     """
     exists = table >= 0
     vectors = np.where(exists[..., None], marker_mm[table] - marker_mm[:, None], 0.0)
@@ -54,10 +34,10 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     x, y = np.moveaxis(vectors / np.maximum(scale, 1e-12)[:, None, None], 2, 0)
     rows = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2) * exists[..., None]
     weights = np.zeros(table.shape)
-    quadratic = count >= LIMITS.min_quadratic_neighbours
+    quadratic = count >= native.MIN_QUADRATIC_NEIGHBOURS
     for terms, selected in (
         (QUADRATIC_TERMS, quadratic),
-        (LINEAR_TERMS, (count >= LIMITS.min_linear_neighbours) & ~quadratic),
+        (LINEAR_TERMS, (count >= native.MIN_LINEAR_NEIGHBOURS) & ~quadratic),
     ):
         map_rows = rows[selected, :, :terms]
         gram = np.swapaxes(map_rows, 1, 2) @ map_rows

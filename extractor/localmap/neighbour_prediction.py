@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import localmap as native
-from extractor.layout.neighbour_tables import LIMITS
 
 
 class MarkerPredictions(NamedTuple):
@@ -47,4 +46,4 @@ def predict_markers(
         marker_mm: (M, 2) the markers in the layout.
         table: (M, K) int32, the neighbours of each marker, or -1.
     """
-    return MarkerPredictions(*native.predict_markers(xy_px, noise_px2, wanted, marker_mm, table, LIMITS))
+    return native.predict_markers(xy_px, noise_px2, wanted, marker_mm, table)

@@ -12,17 +12,17 @@ namespace cmp::complete {
 
 using ImageSize = std::array<Index, 2>;  // width and height, px
 
-// Limits of consistent markers; explained in extractor/complete/consistency_filter.py.
+// Limits of markers that do not contradict their neighbours. Distances and deviations are in edges.
 struct ConsistencyLimits {
-  std::int64_t max_rounds;
-  double max_distance, max_predicted_deviation, max_unexplained_distance;
-  layout::NeighbourMapLimits maps;
-
-  template <class F>
-  static ConsistencyLimits read(const F& f) {
-    return {f["max_rounds"], f["max_distance"], f["max_predicted_deviation"], f["max_unexplained_distance"],
-            f["maps"]};
-  }
+  // of rejection; each round drops the worst marker of every neighbourhood. Measured: rule "ring outliers".
+  std::int64_t max_rounds = 40;
+  // between a marker and its prediction by two rings. Measured: `python -m benchmarks.acceptance`.
+  double max_distance = 0.14;
+  // of the prediction of a marker that only two triangles confirm. Measured: rule "confirmed".
+  double max_predicted_deviation = 0.12;
+  // of a marker that is obstructed, and the deviation of its prediction. Measured: rule "unexplained".
+  double max_unexplained_distance = 0.06;
+  layout::NeighbourMapLimits maps;  // of the predictions
 };
 
 // Results of earlier stages for the tests of markers, for each of M markers.

@@ -5,15 +5,14 @@
 
 namespace cmp::complete {
 
-// Limits of these quadratics; explained in extractor/complete/layer_arcs.py.
+// Limits of the quadratics through layers.
 struct LayerLimits {
-  std::int64_t min_markers;
-  double picture_freedom;
-
-  template <class F>
-  static LayerLimits read(const F& f) {
-    return {f["min_markers"], f["picture_freedom"]};
-  }
+  // known markers of a layer within a sextant, for a quadratic with a residual. Derived: three coefficients,
+  // and two equations over.
+  std::int64_t min_markers = 5;
+  // degrees of freedom by which the residuals of all quadratics of the picture count beside those of one.
+  // Chosen: as many as a quadratic through the fewest markers has.
+  double picture_freedom = 4.0;
 };
 
 // Places of M markers on the quadratics through their layers and sextants.
@@ -21,6 +20,8 @@ struct LayerPrediction {
   Array<double, 2> xy_px;       // (M, 2) NaN where there are too few markers, as where a marker is known
   Array<double, 1> misfit_px2;  // (M,) from the marker to the quadratic, per axis, by its own residuals alone
   Array<double, 1> variance_px2;  // (M,) of the place, per axis; both are infinite without a place
+
+  CMP_RECORD("extractor.complete.layer_arcs.LayerPlaces", xy_px, misfit_px2, variance_px2)
 };
 
 // Places of the unknown markers between known ones, on the quadratic through their layer and sextant.

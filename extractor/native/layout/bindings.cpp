@@ -9,6 +9,8 @@
 namespace cmp::layout {
 
 void add_layout(nb::module_ module) {
+  module.attr("MIN_LINEAR_NEIGHBOURS") = NeighbourMapLimits{}.min_linear_neighbours;
+  module.attr("MIN_QUADRATIC_NEIGHBOURS") = NeighbourMapLimits{}.min_quadratic_neighbours;
   bind<&layer_of>(module, "layer_of", {"q", "r"});
   bind<&marker_id>(module, "marker_id", {"q", "r"});
   bind<&cells_at>(module, "cells_at", {"axial", "cell_lookup"});

@@ -7,15 +7,14 @@ namespace cmp::layout {
 
 inline constexpr Index RING_MARKERS = 18;  // in two rings
 
-// Limits of maps through neighbours; explained in extractor/layout/neighbour_tables.py.
+// Limits of maps through the markers around a marker.
 struct NeighbourMapLimits {
-  double min_spread;
-  Index min_linear_neighbours, min_quadratic_neighbours;
-
-  template <class F>
-  static NeighbourMapLimits read(const F& f) {
-    return {f["min_spread"], f["min_linear_neighbours"], f["min_quadratic_neighbours"]};
-  }
+  // least ratio of the neighbours' spread across to along; below it they lie on one line. Chosen.
+  double min_spread = 1e-3;
+  // fewer markers give no map. Derived: three coefficients, and one equation over.
+  Index min_linear_neighbours = 4;
+  // fewer markers give the linear map. Derived: six coefficients, and three equations over.
+  Index min_quadratic_neighbours = 9;
 };
 
 // (M, 18) ids of the markers in the two rings around each marker at the axial (M, 2); -1 outside the pattern.

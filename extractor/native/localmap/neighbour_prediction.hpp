@@ -17,6 +17,9 @@ struct MarkerPredictions {
   Array<double, 1> noise_px2;     // (M,) the variance per axis of the prediction by the neighbours' noise
   Array<double, 1> neighbour_noise_px2;    // (M,) the mean of the neighbours' noise
   Array<std::int32_t, 1> neighbour_count;  // (M,) the number of known neighbours
+
+  CMP_RECORD("extractor.localmap.neighbour_prediction.MarkerPredictions", xy_px, variance_px2, leverage,
+             noise_px2, neighbour_noise_px2, neighbour_count)
 };
 
 // Whether a known marker m lies farther than limit_px from its prediction by the neighbours; also true where
