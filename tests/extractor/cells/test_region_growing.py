@@ -16,7 +16,7 @@ from extractor.cells.cells import EFFORTS, Cells, find_cells
 from extractor.cells.region_growing import MAX_GROWN_AREA, grow
 from extractor.image.pyramid import PyramidLevel
 from tests.support.layouts import small_layout
-from tests.support.pictures import extractor, picture
+from tests.support.pictures import picture, pyramid_of
 
 Image = NDArray[np.uint8]
 PITCH_PX = 26.0
@@ -24,7 +24,7 @@ THRESHOLD = 0.15  # as in the article, below eq. 3
 
 
 def view_of(image: Image) -> PyramidLevel:
-    return extractor().pyramid(image, image.dtype).level(1)
+    return pyramid_of(image).level(1)
 
 
 def cells_at(xy: list[tuple[float, float]], area_px: float) -> Cells:
