@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import Camera, Optics, Rendered, Scene, Sensor, render
 from extractor import Extractor, parse_layout
-from extractor.image.pyramid import Pyramid
-from extractor.pipeline import ImageReader
 from tests.support.layouts import small_layout, small_text
 
 Image = NDArray[np.uint8]
@@ -26,13 +24,6 @@ SIZE = (360, 300)
 def extractor(pattern: str = "honeycomb", layers: int = 4) -> Extractor:
     """It reads both sides, as ``picture`` shows both."""
     return Extractor(parse_layout(small_text(pattern, layers)), side="either")
-
-
-def pyramid_of(image: Image) -> Pyramid:
-    """The scales of a picture in sRGB."""
-    pyramid = ImageReader(parse_layout(small_text("honeycomb", 4))).pyramid(image)
-    assert pyramid is not None
-    return pyramid
 
 
 @cache

@@ -16,7 +16,8 @@ from extractor.cells.cells import Cells
 from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_fit import fit_edges, regions_as_cells
 from extractor.image.pyramid import PyramidLevel
-from tests.support.pictures import pyramid_of, srgb_light, srgb_values
+from extractor.pipeline import ImageReader
+from tests.support.pictures import extractor, srgb_light, srgb_values
 
 Points = NDArray[np.float64]
 FINE = 8  # small pixels to a pixel and axis
@@ -66,7 +67,9 @@ def measured(view: PyramidLevel, corners: Points) -> Points:
 
 
 def view_of(image: NDArray[np.uint8]) -> PyramidLevel:
-    return pyramid_of(image).level(1)
+    pyramid = ImageReader(extractor().layout).pyramid(image)
+    assert pyramid is not None
+    return pyramid.level(1)
 
 
 def picture_of(cover: Points, blur_px: float) -> PyramidLevel:
