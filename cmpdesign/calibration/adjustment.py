@@ -3,7 +3,8 @@
 The unknowns are the camera's parameters and the sheet's shape, common to all pictures, and one pose a picture. The
 poses are eliminated picture by picture (Schur's complement), so that the system to solve has the size of the common
 part. Every picture has its own scale of errors, estimated from its residuals, so that a picture that contradicts weighs
-little; points beyond ``HUBER`` deviations weigh less (Huber 1964).
+little; points beyond ``HUBER`` deviations weigh less (Huber 1964). The covariance follows from how well the pictures
+agree (``agreement``).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.calibration.agreement import disagreements
 from cmpdesign.calibration.models import CameraModel, parameters
 from cmpdesign.calibration.sightings import Sheet, Sighting
 from extractor import View
@@ -141,6 +143,7 @@ class Adjusted:
         gradients: (V, G) each picture's part of the gradient.
         chi2: (V,) weighted squares, in these scales.
         prior: (G,) information of the usual values.
+        disagreement: (V,) of each picture's answer from that of all others, in deviations that follow from the scales.
     """
 
     problem: Problem
@@ -152,6 +155,7 @@ class Adjusted:
     gradients: Array
     chi2: Array
     prior: Array
+    disagreement: Array
 
     @property
     def camera(self) -> View:
@@ -344,7 +348,13 @@ def _finish(problem: Problem, guess: Guess, scales: Array, base: float, prior: _
     reduced = blocks.common - carried @ np.swapaxes(blocks.mixed, 1, 2)
     gradients = blocks.right - (carried @ blocks.right_pose[:, :, None])[:, :, 0]
     chi2 = _squares(residuals(problem, guess) / scales[:, None, None])
-    information = reduced.sum(axis=0) + np.diag(prior.information)
-    root = np.sqrt(information.diagonal())
-    cov = np.linalg.inv(information / root / root[:, None]) / root / root[:, None]
-    return Adjusted(problem, guess, cov, scales, base, reduced, gradients, chi2, prior.information)
+    apart = disagreements(reduced, gradients, prior.information)
+    cov = covariance(reduced.sum(axis=0), prior.information, apart)
+    return Adjusted(problem, guess, cov, scales, base, reduced, gradients, chi2, prior.information, apart)
+
+
+def covariance(information: Array, prior: Array, disagreement: Array) -> Array:
+    """(G, G) covariance of the common unknowns from the pictures' information (G, G), by their disagreement (V,)."""
+    total = information / np.mean(disagreement**2) + np.diag(prior)
+    root = np.sqrt(total.diagonal())
+    return np.asarray(np.linalg.inv(total / root / root[:, None]) / root / root[:, None])
