@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.calibration.agreement import disagreements
+from cmpdesign.calibration.agreement import Agreement, agreement
 from cmpdesign.calibration.models import CameraModel, parameters
 from cmpdesign.calibration.sightings import Sheet, Sighting
 from extractor import View
@@ -72,6 +72,11 @@ class Problem:
     def counts(self) -> Array:
         """(V,) numbers of each picture, two a point."""
         return np.array([2.0 * len(one.ids) for one in self.sightings])
+
+    @property
+    def freedom(self) -> Array:
+        """(V,) numbers of each picture less its pose's 6."""
+        return np.asarray(np.maximum(self.counts - 6, 1.0))
 
     @cached_property
     def points(self) -> _Points:
@@ -143,7 +148,7 @@ class Adjusted:
         gradients: (V, G) each picture's part of the gradient.
         chi2: (V,) weighted squares, in these scales.
         prior: (G,) information of the usual values.
-        disagreement: (V,) of each picture's answer from that of all others, in deviations that follow from the scales.
+        agreement: of each picture with all others, in these scales.
     """
 
     problem: Problem
@@ -155,7 +160,7 @@ class Adjusted:
     gradients: Array
     chi2: Array
     prior: Array
-    disagreement: Array
+    agreement: Agreement
 
     @property
     def camera(self) -> View:
@@ -167,11 +172,6 @@ class Adjusted:
         """(4 + K, 4 + K) covariance of the camera's parameters."""
         count = 4 + self.problem.model.coefficients
         return self.cov[:count, :count]
-
-    @property
-    def freedom(self) -> Array:
-        """(V,) numbers of each picture less its pose's 6."""
-        return np.asarray(np.maximum(self.problem.counts - 6, 1.0))
 
 
 def adjust(problem: Problem, start: Guess) -> Adjusted:
@@ -334,7 +334,7 @@ def linearise(problem: Problem, guess: Guess, scales: Array) -> Blocks:
 
 def _scales(problem: Problem, residual: Array, scales: Array) -> tuple[Array, float]:
     """(V,) the pictures' scales by their residuals, none below a usual picture's, and that one."""
-    freedom = np.maximum(problem.counts - 6, 1.0)
+    freedom = problem.freedom
     found = np.sqrt((residual**2).sum(axis=(1, 2)) / freedom)
     for _ in range(10):  # to the scales at which Huber's cost is as expected
         found = found * np.sqrt(np.maximum(_squares(residual / found[:, None, None]) / freedom, 0.01))
@@ -348,13 +348,13 @@ def _finish(problem: Problem, guess: Guess, scales: Array, base: float, prior: _
     reduced = blocks.common - carried @ np.swapaxes(blocks.mixed, 1, 2)
     gradients = blocks.right - (carried @ blocks.right_pose[:, :, None])[:, :, 0]
     chi2 = _squares(residuals(problem, guess) / scales[:, None, None])
-    apart = disagreements(reduced, gradients, prior.information)
-    cov = covariance(reduced.sum(axis=0), prior.information, apart)
-    return Adjusted(problem, guess, cov, scales, base, reduced, gradients, chi2, prior.information, apart)
+    agreed = agreement(reduced, gradients, chi2, problem.freedom, prior.information)
+    cov = covariance(reduced.sum(axis=0), prior.information, agreed.difference)
+    return Adjusted(problem, guess, cov, scales, base, reduced, gradients, chi2, prior.information, agreed)
 
 
-def covariance(information: Array, prior: Array, disagreement: Array) -> Array:
-    """(G, G) covariance of the common unknowns from the pictures' information (G, G), by their disagreement (V,)."""
-    total = information / np.mean(disagreement**2) + np.diag(prior)
+def covariance(information: Array, prior: Array, difference: Array) -> Array:
+    """(G, G) covariance of the common unknowns from the pictures' information (G, G), by their differences (V,)."""
+    total = information / np.mean(difference**2) + np.diag(prior)
     root = np.sqrt(total.diagonal())
     return np.asarray(np.linalg.inv(total / root / root[:, None]) / root / root[:, None])

@@ -17,7 +17,7 @@ from extractor import View
 
 Array = NDArray[np.float64]
 
-CONTRADICTS = 3.0  # disagreement of a picture with all others, over a usual picture's; chosen
+CONTRADICTS = 3.0  # difference of a picture from all others over its scatter, over a usual picture's; chosen
 EXPLAINED = 0.5  # share of a picture's squares that its cause leaves at most; chosen
 ANOTHER_LENS = "another focal length or focus than in the other pictures"
 BENT = "the sheet is bent otherwise than in the other pictures"
@@ -46,8 +46,7 @@ class Advice(NamedTuple):
 
 def contradicting(adjusted: Adjusted) -> NDArray[np.bool_]:
     """(V,) bool, the pictures that disagree with all others much more than usual."""
-    apart = adjusted.disagreement * adjusted.scales
-    return np.asarray(apart > CONTRADICTS * np.median(apart))
+    return np.asarray(adjusted.agreement.contradiction > CONTRADICTS)
 
 
 def likely_cause(adjusted: Adjusted, number: int) -> str:
@@ -95,7 +94,7 @@ def best_further_view(adjusted: Adjusted) -> Advice:
     found = []
     for text, view in _tilted_views(adjusted):
         known = information + _information(adjusted, view)
-        cov = covariance(known, adjusted.prior, adjusted.disagreement)[:lens, :lens]
+        cov = covariance(known, adjusted.prior, adjusted.agreement.difference)[:lens, :lens]
         found.append(Advice(text, ray_rms_px(adjusted.camera, cov, adjusted.problem.size_px)))
     return min(found, key=lambda advice: advice.ray_px)
 

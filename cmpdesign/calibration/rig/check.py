@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 MAX_MISFIT = (
     3.0  # residuals over those of the calibration, from which it does not hold; as of a rest frame. Chosen
 )
-EXPLAINED = 0.5  # share of the residuals that a cause may leave to count as the likely one; chosen
+EXPLAINED = 0.25  # share of the residuals that a cause may leave to count as the likely one; chosen
 ALIKE = 16.0  # squares beyond those of the best cause, in its mean squares, up to which a cause is named, too; chosen
 HUBER = 4.0  # deviations
 ROUNDS = 20  # of Levenberg-Marquardt
