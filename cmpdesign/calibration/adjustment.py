@@ -260,11 +260,21 @@ def _moved(problem: Problem, guess: Guess, common: Array, poses: Array) -> Guess
     if not np.isfinite(changed).all() or changed[:2].min() <= 0.05 * values[:2].min():
         return None
     camera = problem.model.view(changed)
-    views = [
-        camera.at(view.R_camera_from_layout, view.t_camera_from_layout_mm).turned(step)
-        for view, step in zip(guess.views, poses, strict=True)
-    ]
+    turns = _rotations(poses[:, :3]) @ np.stack([view.R_camera_from_layout for view in guess.views])
+    left, _, right = np.linalg.svd(turns)
+    shifts = np.stack([view.t_camera_from_layout_mm for view in guess.views]) + poses[:, 3:]
+    views = [camera.at(turn, shift) for turn, shift in zip(left @ right, shifts, strict=True)]
     return Guess(tuple(views), guess.shape + common[len(values) :])
+
+
+def _rotations(turns: Array) -> Array:
+    """(V, 3, 3) of turns (V, 3) in rad, by Rodrigues' formula."""
+    angle = np.linalg.norm(turns, axis=1)[:, None, None]
+    cross = cross_matrix(turns)
+    small = np.maximum(angle, 1e-12)
+    return np.asarray(
+        np.eye(3) + np.sin(angle) / small * cross + (1 - np.cos(angle)) / small**2 * cross @ cross
+    )
 
 
 class _Seen(NamedTuple):
