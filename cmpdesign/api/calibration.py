@@ -1,10 +1,11 @@
-"""Calibrations of one sensor: ``calibrate camera``, ``calibrate pattern``, ``calibrate rig`` of the command line."""
+"""Calibrations of one sensor: ``calibrate camera``, ``pattern``, ``rig`` and ``check`` of the command line."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -18,11 +19,16 @@ if TYPE_CHECKING:
 
     from cmpdesign.calibration.camera import CameraCalibration
     from cmpdesign.calibration.rig.calibration import RigCalibration
-    from cmpdesign.documents.calibration import CalibrateCameraDocument, CalibrateRigDocument
+    from cmpdesign.calibration.rig.check import SensorCheck
+    from cmpdesign.documents.calibration import (
+        CalibrateCameraDocument,
+        CalibrateCheckDocument,
+        CalibrateRigDocument,
+    )
     from cmpdesign.documents.reading import CalibratePatternDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.sensor.sensor_file import SensorFile
-    from extractor import LayoutLike, LearntLayout, Markers, Reference
+    from extractor import LayoutLike, LearntLayout, Markers, Reference, Rig
 
 MOST_WAY_MM = 100  # of a step
 
@@ -240,7 +246,7 @@ def calibrate_rig(
         _require_beside(Path(rig), Path(output))
     given = [rest] if isinstance(rest, str | Path) else list(rest)
     names = [*map(str, given), *map(str, ways.values())]
-    found = _read_views(sensor, reference, names, side, max_pixels)
+    found = _read_views(sensor, reference, sensor.rig.without_poses(), names, side, max_pixels)
     camera = sensor.table.calibration.camera
     calibration = calibrate_rig_markers(
         reference,
@@ -293,6 +299,80 @@ def _rig_document(
     )
 
 
+def calibrate_check(
+    sensor: str | Path,
+    images: Annotated[str | Path | Sequence[str | Path], Written(metavar="REST")],
+    *,
+    layout: LayoutLike | AnyLayout | None = None,
+    max_pixels: int = MOST_PIXELS,
+) -> CalibrateCheckDocument:
+    """Check a sensor's calibration by its pad at rest. If it does not hold, the cause and the step to repeat are named.
+
+    >>> found = cmpdesign.calibrate_check("sensor.toml", ["today.png"])
+    >>> found.holds, found.misfit, [one.cause for one in found.causes if one.likely], found.steps
+
+    Args:
+        sensor: sensor file that calibrate rig wrote; it names its layout.
+        images: pictures of the pad at rest; of several cameras one each, joined by commas.
+        layout: the pad's layout; None: the one that the file names.
+        max_pixels: see ``SequenceOptions``.
+
+    Raises:
+        CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures that show no pattern.
+    """
+    from cmpdesign.api.layouts import reference_from
+    from cmpdesign.calibration.rig.check import check_markers
+    from cmpdesign.sensor.sensor_file import load_sensor_file
+
+    file = load_sensor_file(sensor)
+    unplaced = [view.name for view in file.rig.views if not view.placed]
+    if unplaced:
+        raise CmpDesignError(
+            f"{sensor}: view {unplaced[0]!r} has no pose, so that there is nothing to compare; first: cmpdesign "
+            "calibrate rig"
+        )
+    reference = reference_from(file.layout if layout is None else layout)
+    names = [str(images)] if isinstance(images, str | Path) else [str(one) for one in images]
+    found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
+    before = file.table.calibration.rig
+    stated = before.rms_px if before is not None and len(before.rms_px) == len(file.rig.views) else ()
+    checked = check_markers(
+        reference,
+        file.rig,
+        found,
+        stated_px=dict(zip(file.rig.names, stated, strict=False)),
+        scale=before.scale if before is not None else 1.0,
+        limit_px=file.table.limits.max_rest_error_px,
+    )
+    return _check_document(checked, names)
+
+
+def _check_document(found: SensorCheck, names: Sequence[str]) -> CalibrateCheckDocument:
+    from cmpdesign.documents.calibration import CalibrateCheckDocument
+
+    causes = [
+        {
+            "cause": one.cause,
+            "left": one.left,
+            "changes": dict(one.changes),
+            "likely": one.cause in found.likely,
+        }
+        for one in found.causes
+    ]
+    return CalibrateCheckDocument.of(
+        found,
+        holds=found.holds,
+        misfit=found.misfit,
+        picture_misfits=dict(zip(names, found.picture_misfits, strict=True)),
+        rms_px=dict(found.rms_px),
+        stated_px=dict(found.stated_px),
+        limit_px=found.limit_px,
+        causes=causes,
+        steps=found.steps,
+        depth_error=found.depth_error if isfinite(found.depth_error) else None,
+    )
+
+
 def _require_beside(rig: Path, output: Path) -> None:
     if output.resolve() == rig.resolve():
         raise CmpDesignError(
@@ -305,9 +385,9 @@ def _require_beside(rig: Path, output: Path) -> None:
 
 
 def _read_views(
-    sensor: SensorFile, reference: Reference, names: Sequence[str], side: Side, max_pixels: int
+    sensor: SensorFile, reference: Reference, rig: Rig, names: Sequence[str], side: Side, max_pixels: int
 ) -> list[tuple[Markers, ...]]:
-    """The markers of all pictures, view by view.
+    """The markers of all pictures, view by view; ``rig`` is the sensor's, with or without poses.
 
     Raises:
         CmpDesignError: a picture in which a view shows no pattern.
@@ -316,9 +396,7 @@ def _read_views(
     from extractor import ViewExtractor
     from extractor.result import SIDE_REASONS
 
-    views = ViewExtractor(
-        reference, sensor.rig.without_poses(), "accurate", cast("Any", sensor.table.response), side
-    )
+    views = ViewExtractor(reference, rig, "accurate", cast("Any", sensor.table.response), side)
     out = []
     for number, name in enumerate(names):
         pictures = [read_image(Path(part), max_pixels) for part in name.split(",")]
