@@ -3,48 +3,14 @@
 from __future__ import annotations
 
 import io
-import shutil
-import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks.studio.page import browser, served
+
 SCREENS = Path(__file__).resolve().parents[2] / "docs" / "screens"
-# As root, Chromium runs without its sandbox only; SwiftShader draws 3-D without a graphics card.
-FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--use-fake-ui-for-media-stream"]
 COLORS = 128
-
-
-def chromium() -> str | None:
-    """The path of an installed Chromium; None without one."""
-    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-
-
-@contextmanager
-def served(*words: str) -> Iterator[str]:
-    """The address of a running page: of ``cmpdesign studio``, or of the words of another command."""
-    command = [sys.executable, "-m", "cmpdesign", *(words or ("studio",)), "--port", "0", "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    with process.stdout as printed:
-        try:
-            yield printed.readline().strip()
-        finally:
-            process.terminate()
-            process.wait(20)
-
-
-@contextmanager
-def browser() -> Iterator[Any]:
-    """Chromium, driven by Playwright."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
-        yield running
-        running.close()
 
 
 def main() -> None:

@@ -2,6 +2,8 @@
 
 import * as three from "./three.js";
 
+const PRESSED = new three.Color("#ff2020").toArray();
+
 export class Surface {
   constructor() {
     this.renderer = new three.WebGLRenderer({ antialias: true, alpha: true });
@@ -16,26 +18,27 @@ export class Surface {
     this.controls = new three.OrbitControls(this.camera, this.canvas);
   }
 
-  // Markers move from their place at rest by their displacement, enlarged.
+  // Markers move from their place at rest by their displacement, enlarged. Cells of lost markers are left out.
   show(pad, frame, factor, width, height) {
     if (this.pad !== pad) this.#begin(pad);
-    const row = new Map(frame.ids.map((id, at) => [id, at])), pressure = frame.contact?.pressure_mpa, most = Math.max(...(pressure ?? []), 1e-3);
-    const points = [], colors = [], color = new three.Color(), pressed = new three.Color("#ff2020");
-    pad.cells.forEach((corners, cell) => {
-      const rows = corners.map((id) => row.get(id));
-      if (rows.includes(undefined)) return;
-      rows.forEach((at) => {
-        const [x, y, z] = frame.place[at], [dx, dy, dz] = frame.moved[at];
-        points.push(x + (factor - 1) * dx, y + (factor - 1) * dy, z + (factor - 1) * dz);
-        color.set(pad.colors[cell]);
-        if (pressure) color.lerp(pressed, Math.max(0, pressure[at] / most) * 0.85);
-        colors.push(color.r, color.g, color.b);
-      });
+    const { position, color } = this.mesh.geometry.attributes, { row } = this;
+    row.fill(-1);
+    frame.ids.forEach((id, at) => { row[id] = at; });
+    const pressure = frame.contact?.pressure_mpa, most = Math.max(...(pressure ?? []), 1e-3);
+    let corner = 0;
+    this.triangles.forEach(([ids, rgb]) => {
+      if (ids.some((id) => row[id] < 0)) return;
+      for (const id of ids) {
+        const at = row[id], place = frame.place[at], moved = frame.moved[at], share = pressure ? Math.max(0, pressure[at] / most) * 0.85 : 0;
+        for (let axis = 0; axis < 3; axis += 1) {
+          position.array[3 * corner + axis] = place[axis] + (factor - 1) * moved[axis];
+          color.array[3 * corner + axis] = rgb[axis] + share * (PRESSED[axis] - rgb[axis]);
+        }
+        corner += 1;
+      }
     });
-    const geometry = this.mesh.geometry;
-    geometry.setAttribute("position", new three.BufferAttribute(new Float32Array(points), 3));
-    geometry.setAttribute("color", new three.BufferAttribute(new Float32Array(colors), 3));
-    geometry.computeVertexNormals();
+    this.mesh.geometry.setDrawRange(0, corner);
+    position.needsUpdate = color.needsUpdate = true;
     this.renderer.setPixelRatio(devicePixelRatio);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
@@ -46,8 +49,12 @@ export class Surface {
 
   #begin(pad) {
     this.pad = pad;
-    if (this.mesh) this.scene.remove(this.mesh);
-    this.mesh = new three.Mesh(new three.BufferGeometry(), new three.MeshStandardMaterial({ vertexColors: true, side: three.DoubleSide, roughness: 0.7, flatShading: true }));
+    if (this.mesh) { this.scene.remove(this.mesh); this.mesh.geometry.dispose(); }
+    this.triangles = pad.cells.flatMap(([first, ...ids], cell) => ids.slice(1).map((id, at) => [[first, ids[at], id], new three.Color(pad.colors[cell]).toArray()]));
+    const geometry = new three.BufferGeometry();
+    for (const name of ["position", "color"]) geometry.setAttribute(name, new three.BufferAttribute(new Float32Array(9 * this.triangles.length), 3));
+    this.row = new Int32Array(pad.xy_mm.length);
+    this.mesh = new three.Mesh(geometry, new three.MeshStandardMaterial({ vertexColors: true, side: three.DoubleSide, roughness: 0.7, flatShading: true }));
     this.mesh.frustumCulled = false;
     this.scene.add(this.mesh);
     const radius = Math.max(...pad.xy_mm.map(([x, y]) => Math.hypot(x, y)));

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import cmpdesign
+from benchmarks.studio.page import browser, chromium, options, served
 from cmpdesign.products.drawing.svg import layout_to_svg
-from tools.figures.screens import FLAGS, browser, chromium, served
 
 pytestmark = [
     pytest.mark.slow,
@@ -225,13 +225,8 @@ def test_200_frames_of_a_camera_against_the_truth(chrome: Any, address: str, tmp
     jpegs = [cv2.imencode(".jpg", one.image, [cv2.IMWRITE_JPEG_QUALITY, 98])[1].tobytes() for one in rendered]
     (tmp_path / "camera.mjpeg").write_bytes(b"".join(jpegs))
     truth = np.stack([one.truth.marker_xy_px for one in rendered])
-    flags = (
-        "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-video-capture={tmp_path}/camera.mjpeg",
-    )
     frames: list[dict[str, Any]] = []
-    options = {"executable_path": chromium(), "args": [*FLAGS, *flags]}
-    with chrome.browser_type.launch(**options) as with_camera:
+    with chrome.browser_type.launch(**options(tmp_path / "camera.mjpeg")) as with_camera:
         page = with_camera.new_page()
         page.on(
             "websocket",
