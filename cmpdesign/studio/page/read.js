@@ -63,15 +63,18 @@ export class ReadPart {
   }
 
   async #read(blob, name) {
-    this.result.replaceChildren(h("div", { class: "box" }, h("p", { class: "soft" }, `Reading ${name}.`)));
+    this.#list(name);
+    this.result.classList.add("stale");
     try {
       const query = new URLSearchParams({ name, fields: JSON.stringify(design.fields), layout: this.layout.key });
       const found = await ask(`/api/readings?${query}`, { body: blob });
       this.readings.push(found);
       await this.#choose(found);
     } catch (error) {
+      this.#list();
       this.result.replaceChildren(h("div", { class: "box" }, h("div", { class: "finding error", role: "alert" }, h("b", { class: "error" }, "Not read"), error.message)));
     }
+    this.result.classList.remove("stale");
   }
 
   async #choose(found) {
@@ -87,12 +90,18 @@ export class ReadPart {
   #show() {
     const actions = { stage: (name) => { this.shownPicture = name; this.#draw(); }, address: (stage) => this.#address(this.found, stage) };
     this.result.replaceChildren(...resultBoxes(this.found, actions));
-    this.list.hidden = false;
-    const isRest = this.found === this.rest;
-    this.list.replaceChildren(h("h2", {}, this.readings.length === 1 ? "Picture" : `${this.readings.length} pictures`),
+    this.#list();
+  }
+
+  // The pictures; awaited: the name of one that is being read.
+  #list(awaited) {
+    const count = this.readings.length + (awaited ? 1 : 0), isRest = this.found && this.found === this.rest;
+    this.list.hidden = !count;
+    this.list.replaceChildren(h("h2", {}, count === 1 ? "Picture" : `${count} pictures`),
       h("div", { class: "pictures", role: "group", "aria-label": "Pictures" }, this.readings.map((one) => h("button", { "aria-pressed": String(one === this.found), title: one.name, onclick: () => told(async () => this.#choose(one)) },
-        h("img", { src: this.#address(one, "picture"), alt: "", loading: "lazy" }), h("span", {}, `${one === this.rest ? "Rest: " : ""}${one.name}`)))),
-      h("div", { class: "row" }, h("button", { "aria-pressed": String(isRest), disabled: !this.found.xy?.length, onclick: () => this.#setRest(isRest ? null : this.found) }, "This is rest"),
+        h("img", { src: this.#address(one, "picture"), alt: "", loading: "lazy" }), h("span", {}, `${one === this.rest ? "Rest: " : ""}${one.name}`))),
+        awaited && h("button", { disabled: true, title: awaited }, h("i", { class: "blank" }), h("span", {}, `Reading ${awaited}`))),
+      h("div", { class: "row" }, h("button", { "aria-pressed": String(Boolean(isRest)), disabled: !this.found?.xy?.length, onclick: () => this.#setRest(isRest ? null : this.found) }, "This is rest"),
         h("button", { onclick: () => { this.readings = []; this.rest = this.found = null; this.list.hidden = true; this.result.replaceChildren(); this.stage.show([0, 0, 1, 1]); this.note.hidden = true; } }, "Remove all")),
       h("div", { class: "row" }, h("label", { class: "row grow" }, "Record", this.kind ??= h("select", {}, KINDS.map(([value, text]) => h("option", { value }, text)))), h("button", { onclick: () => this.#record() }, "Save as track does")));
   }
