@@ -31,8 +31,8 @@ shear_mm = [0.0, 0.0]
 frames = {FRAMES}
 fps = {FPS}
 [sequence.values]
-contact.motion.press_mm = [[0.0, 0.0], [0.7, 0.5]]
-contact.motion.shear_mm = [[0.5, [0, 0]], [1.0, [0.4, 0]]]
+contact.motion.press_mm = [[0.0, 0.0], [0.7, 0.4]]
+contact.motion.shear_mm = [[0.5, [0, 0]], [1.0, [0.3, 0]]]
 """
 
 

@@ -15,7 +15,7 @@ export class TouchPart {
     this.video = h("video", { muted: true, playsinline: true, hidden: true });
     this.health = h("div", { class: "box" });
     this.plot = h("canvas", { class: "plot", role: "img", "aria-label": "Running plot" });
-    this.plotWords = h("p", { class: "small soft" });
+    this.plotWords = h("p", { class: "small soft words" });
     this.factor = h("input", { type: "range", min: 1, max: 30, step: 1, value: 5, id: "factor", oninput: () => this.#draw() });
     this.space = h("div", { class: "canvas" }, this.canvas);
     this.cameras = h("select", { "aria-label": "Camera of this machine" });
@@ -24,7 +24,7 @@ export class TouchPart {
     this.rest = h("button", { disabled: true, onclick: () => this.socket?.send("rest") }, "This is rest");
     const button = (text, act, kind = "") => h("button", { class: kind, onclick: act }, text);
     this.element = h("div", { class: "work two" }, h("aside", { class: "side", "aria-label": "Source and health" },
-      h("div", { class: "box" }, h("h2", {}, "Source"), start.live && button(`Show ${start.live}`, () => this.#openSource(), "primary"), button("Use the camera of this browser", () => this.#openCamera(), start.live ? "" : "primary"),
+      h("div", { class: "box" }, h("h2", {}, "Source"), start.live && button(`Show ${fileOf(start.live)}`, () => this.#openSource(), "primary"), button("Use the camera of this browser", () => this.#openCamera(), start.live ? "" : "primary"),
         h("div", { class: "row" }, h("span", { class: "grow" }, this.cameras), this.machine = button("Use", () => this.#openMachine())),
         h("div", { class: "row" }, this.rest, button("Stop", () => this.#stop("Stopped."))), h("div", { class: "row" }, this.record, h("span", { class: "grow" }, this.kind)), h("p", { class: "soft small" }, "The camera is read with the layout of the present design. Another source: cmpdesign view LAYOUT SOURCE.")),
       h("div", { class: "box" }, h("label", { for: "factor" }, "Arrows and heights, enlarged"), this.factor), h("div", { class: "box" }, h("h2", {}, "Running"), this.plot, this.plotWords), this.health), h("section", { class: "stage", "aria-label": "Live" }, this.space, this.words), this.video);
@@ -46,6 +46,7 @@ export class TouchPart {
   #connect(path, onframe) {
     this.#stop("Connecting.");
     this.frame = this.image = null;
+    this.hasForce = false;
     this.history = [];
     this.shownTimes = [];
     const socket = new WebSocket(`ws://${location.host}${path}`);
@@ -58,7 +59,7 @@ export class TouchPart {
       else if (told.note !== undefined) { toast(told.note); this.#setRecording(false); }
       else if (told.recording) this.#setRecording(true);
       else if (told.saved) { this.#setRecording(false); this.#download(told); }
-      else if (told.cells) { this.pad = told; this.words.textContent = told.name; onframe(null); }
+      else if (told.cells) { this.pad = told; this.words.textContent = told.name = fileOf(told.name); onframe(null); }
       else onframe(told);
     };
     socket.onclose = ({ reason }) => { if (socket === this.socket) this.#stop(reason || "The connection has ended."); };
@@ -176,10 +177,11 @@ export class TouchPart {
   #count(now) {
     const { frame } = this, force = forceOf(frame);
     this.shownTimes = [...this.shownTimes.slice(1 - RATE_FRAMES), now];
-    this.history.push(force ? force.force_n : [frame.largest_mm ?? NaN]);
+    this.hasForce ||= Boolean(force);
+    this.history.push(force ? { values: [...force.force_n, ...force.torque_nmm], sigmas: [...force.force_sigma_n, ...force.torque_sigma_nmm] } : { values: this.hasForce ? [] : [frame.largest_mm ?? NaN], sigmas: [] });
     this.history.splice(0, this.history.length - PLOT_FRAMES);
     if (this.socket) this.words.textContent = frame.tracked ? `${this.pad.name} · frame ${frame.index}` : "The pattern is not found.";
-    this.#plotHistory(force);
+    this.#plotHistory();
   }
 
   #tell() {
@@ -187,25 +189,41 @@ export class TouchPart {
     const withSigma = (name, values, sigmas, unit) => values.map((value, at) => [`${name} ${"xyz"[at]}`, `${value.toFixed(3)} ± ${sigmas[at].toFixed(3)} ${unit}`]);
     const rows = [["Markers measured", `${frame.measured} of ${this.pad.markers}`], ["Reader", `${frame.elapsed_ms.toFixed(1)} ms`], ["Source", `${frame.frames_per_s.toFixed(1)} frames/s`], ["Shown", `${shown.toFixed(1)} frames/s`], ["Frame", frame.index],
       ["Largest displacement", frame.largest_mm === null ? "–" : `${number(frame.largest_mm, 3)} mm`]];
-    if (force) rows.push(...withSigma("Force", force.force_n, force.force_sigma_n, "N"), ...withSigma("Torque", force.torque_nmm, force.torque_sigma_nmm, "N mm"), ["Contacts", force.regions.length], ...(force.utilisation === null ? [] : [["Of the friction", force.utilisation < 1 ? `${number(100 * force.utilisation, 2)} %` : "slips"]]));
+    if (force) rows.push(...withSigma("Force", force.force_n, force.force_sigma_n, "N"), ...withSigma("Torque", force.torque_nmm, force.torque_sigma_nmm, "N mm"), ["Pressure to", `${number(1e3 * Math.max(...force.pressure_mpa), 3)} kPa`], ["Shear to", `${number(1e3 * Math.max(...force.shear_mpa.map((by) => Math.hypot(...by))), 3)} kPa`], ["Contacts", force.regions.length], ...(force.utilisation === null ? [] : [["Of the friction", force.utilisation < 1 ? `${number(100 * force.utilisation, 2)} %` : "slips"]]));
     const notes = [...new Set([frame.reason, frame.contact?.reason, ...frame.hints].filter(Boolean))].map((text) => h("div", { class: `finding ${frame.tracked ? "warning" : "error"}` }, text));
     this.health.replaceChildren(h("h2", {}, "Health"), figures(rows), ...notes);
   }
 
-  #plotHistory(force) {
-    const { clientWidth: width, clientHeight: height } = this.plot, context = this.plot.getContext("2d");
+  // Force and torque over the last frames with their deviations, or the largest displacement.
+  #plotHistory() {
+    const { clientWidth: width, clientHeight: height } = this.plot, ratio = devicePixelRatio, context = this.plot.getContext("2d");
     if (!width) return;
-    Object.assign(this.plot, { width, height });
-    const known = this.history.flat().filter(Number.isFinite), low = Math.min(0, ...known), high = Math.max(1e-6, ...known);
-    const y = (value) => height - 6 - ((value - low) / (high - low)) * (height - 12);
-    this.history.at(-1).forEach((_, axis) => {
-      context.strokeStyle = AXIS_COLORS[axis];
+    Object.assign(this.plot, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
+    context.scale(ratio, ratio);
+    const panels = this.hasForce ? [["Force, N", 0, 3], ["Torque, N mm", 3, 6]] : [["Largest displacement, mm", 0, 1]];
+    this.plotWords.replaceChildren(...panels.map(([title, first, end], at) => {
+      const [low, high] = this.#plotPanel(context, first, end, (at * height) / panels.length, width, height / panels.length);
+      return h("span", {}, `${title}: ${number(low, 3)} to ${number(high, 3)}`);
+    }), this.hasForce ? h("span", {}, "red x, green y, blue z; bands: deviations") : "");
+  }
+
+  // The values of a panel between their lowest and highest.
+  #plotPanel(context, first, end, top, width, height) {
+    const axes = [...Array(end - first).keys()], column = (axis) => this.history.map(({ values, sigmas }) => [values[first + axis] ?? NaN, sigmas[first + axis] ?? 0]);
+    const columns = axes.map(column), known = columns.flat().map(([value]) => value).filter(Number.isFinite), low = Math.min(0, ...known), high = Math.max(1e-6, ...known);
+    const x = (at) => (at / PLOT_FRAMES) * width, y = (value) => top + height - 5 - ((value - low) / (high - low)) * (height - 10);
+    columns.forEach((points, axis) => {
+      context.strokeStyle = context.fillStyle = AXIS_COLORS[axis];
+      context.globalAlpha = 0.25;
+      points.forEach(([value, sigma], at) => { if (sigma > 0) context.fillRect(x(at), y(value + sigma), x(1), y(value - sigma) - y(value + sigma)); });
+      context.globalAlpha = 1;
       context.beginPath();
-      this.history.forEach((values, at) => context.lineTo((at / PLOT_FRAMES) * width, y(values[axis] ?? NaN)));
+      points.forEach(([value], at) => context.lineTo(x(at), y(value)));
       context.stroke();
     });
-    this.plotWords.textContent = force ? `Force, N: red x, green y, blue z; from ${number(low, 3)} to ${number(high, 3)}` : `Largest displacement, mm; to ${number(high, 3)}`;
+    return [low, high];
   }
 }
 
+const fileOf = (name) => name.split(/[\\/]/).at(-1);
 const forceOf = (frame) => (frame.contact?.known ? frame.contact : null);
