@@ -149,13 +149,14 @@ export class ReadPart {
 
   #draw() {
     if (!this.found) return;
-    const { size_px: [width, height], xy, status, edges, cov, quality } = this.found, layers = [], notes = [];
+    const { size_px: [width, height], xy, status, edges, cov, quality, explained } = this.found, layers = [], notes = [];
     // The centre of the top-left pixel is (0, 0).
     layers.push(h("image", { href: this.#address(this.found, this.shownPicture), x: -0.5, y: -0.5, width, height }));
     const enlarged = 10 ** Number(this.scale.value);
     if (xy && this.shownPicture === "picture") {
       if (this.look.grid) layers.push(h("path", { class: "gridlines", d: edges.map(([from, to]) => `M${xy[from]}L${xy[to]}`).join("") }));
       layers.push(h("g", { class: "dots", "stroke-width": 5 }, [1, 2, 3].map((code) => h("path", { class: `s${code}`, d: xy.filter((_, at) => status[at] === code).map((point) => `M${point}h0`).join("") }))));
+      if (explained) layers.push(h("path", { class: "covered", d: xy.filter((_, at) => !explained[at]).map((point) => `M${point}h0`).join("") }));
       if (this.look.ellipses) {
         const sigmas = cov.map(([xx, , yy]) => Math.sqrt(xx + yy)).sort((one, other) => one - other);
         const factor = roundFactor((0.35 * (quality?.edge_px ?? 20)) / (sigmas[sigmas.length >> 1] || 1));
