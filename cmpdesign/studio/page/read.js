@@ -85,6 +85,7 @@ export class ReadPart {
     this.shownPicture = found.xy && !found.xy.length && found.stages.length ? found.stages.at(-1) : "picture";
     this.#show();
     await this.#compare();
+    if (this.shownPicture !== "picture") this.stage.fit();
   }
 
   #show() {

@@ -211,7 +211,7 @@ export class TouchPart {
   #plotPanel(context, first, end, top, width, height) {
     const axes = [...Array(end - first).keys()], column = (axis) => this.history.map(({ values, sigmas }) => [values[first + axis] ?? NaN, sigmas[first + axis] ?? 0]);
     const columns = axes.map(column), known = columns.flat().map(([value]) => value).filter(Number.isFinite), low = Math.min(0, ...known), high = Math.max(1e-6, ...known);
-    const x = (at) => (at / PLOT_FRAMES) * width, y = (value) => top + height - 5 - ((value - low) / (high - low)) * (height - 10);
+    const x = (at) => (at / Math.max(RATE_FRAMES, this.history.length)) * width, y = (value) => top + height - 5 - ((value - low) / (high - low)) * (height - 10);
     columns.forEach((points, axis) => {
       context.strokeStyle = context.fillStyle = AXIS_COLORS[axis];
       context.globalAlpha = 0.25;
