@@ -19,6 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 
 import cmpdesign
 from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_opencv, write_sensor
+from cmpdesign.errors import CmpDesignError
 from cmpdesign.runtime.events import EventKind
 from cmpdesign.runtime.pairing import nearest_places
 from cmpdesign.runtime.sensor import LateError
@@ -29,6 +30,7 @@ from cmpdesign.sensor.tables import SensorError
 from extractor import FrameStatus
 from tests.support.layouts import small_text
 from tests.support.tracking.foxglove_client import Received, open_client, take
+from tests.support.tracking.messages import read_messages
 from tests.support.tracking.press import write_press
 from tests.support.tracking.scenes import LAYERS, errors, moving, shot
 
@@ -250,6 +252,33 @@ def test_health_says_what_has_changed_since_the_rest(folder: Path, plug: Plug) -
         assert health(np.roll(scratched, 2, axis=1)).advice == ()
         bare = health(np.roll(clean, 2, axis=1))
         assert bare.left_out == good.left_out and bare.share_read == 1.0
+
+
+def test_a_recording_of_running_sensors_has_their_gaps(folder: Path, plug: Plug, shots: list[Any]) -> None:
+    """Read by the library of the format: every result is there, and the gap is told in the diagnostics."""
+    images = [one.image for one in shots]
+    plug(TimedCamera(images, FPS, [Fault("stall", 0.5, 0.9)]), TimedCamera(images, FPS))
+    path = folder / "run.mcap"
+    with opened(folder / "thumb.toml", folder / "index.toml") as sensors:
+        with pytest.raises(CmpDesignError, match=r"ends in \.mcap"):
+            sensors.record(folder / "run.npz")
+        sensors.wait()
+        recording = sensors.record(path)
+        after(sensors.thumb, EventKind.RESUMED)
+        sensors.thumb.wait(after=sensors.thumb.results[-1].index + 1)
+        assert not path.exists()
+    messages = read_messages(path)
+    counts = [len(messages[f"/{name}/markers"]) for name in ("thumb", "index")]
+    assert sum(counts) == recording.frames == len(messages["/diagnostics"]) and min(counts) > 0
+    assert recording.missed == 0
+    told = [
+        pair.value
+        for one in messages["/diagnostics"]
+        for pair in one.decoded_message.status[0].values
+        if pair.key == "events"
+    ]
+    assert any("frames again after" in text for text in told) and "" in told
+    recording.close()
 
 
 def test_a_surface_of_recorded_views(tmp_path: Path) -> None:
