@@ -16,7 +16,7 @@ from cmpdesign.sensor.sensor_file import load_sensor_file
 from cmpdesign.sensor.tables import SensorError
 
 if TYPE_CHECKING:
-    from cmpdesign.runtime.recording import SensorRecording
+    from cmpdesign.runtime.publish.recording import SensorRecording
 
 
 class Sensors:
@@ -82,7 +82,7 @@ class Sensors:
         Raises:
             CmpDesignError, OutputError: see ``SensorRecording``.
         """
-        from cmpdesign.runtime.recording import SensorRecording
+        from cmpdesign.runtime.publish.recording import SensorRecording
 
         self._recordings.append(SensorRecording(self, Path(path)))
         return self._recordings[-1]

@@ -83,7 +83,7 @@ def _mean(several: Sequence[Markers], name: str) -> Markers:
     return replace(several[-1], xy_px=xy_px.mean(axis=0), cov_px2=cov_px2, status=status)
 
 
-class Motion(NamedTuple):
+class WayFromRest(NamedTuple):
     """The way of the markers of a view from the rest frame, RMS over markers and axes; NaN where it is not known.
 
     Attributes:
@@ -104,7 +104,9 @@ class Motion(NamedTuple):
         return self.bend_px > self.limit_px
 
 
-def motion_of(markers: Markers, rest_px: NDArray[Any], layout: Reference, most_px: float | None) -> Motion:
+def motion_of(
+    markers: Markers, rest_px: NDArray[Any], layout: Reference, most_px: float | None
+) -> WayFromRest:
     """The way from the rest frame.
 
     Args:
@@ -116,7 +118,7 @@ def motion_of(markers: Markers, rest_px: NDArray[Any], layout: Reference, most_p
     moved_px = markers.xy_px - rest_px
     known = np.isfinite(moved_px).all(axis=1) & (markers.status == 1)
     if known.sum() < max(FEWEST_SHARE * known.size, 4):
-        return Motion(float("nan"), float("nan"), float("nan"), float("nan"))
+        return WayFromRest(float("nan"), float("nan"), float("nan"), float("nan"))
     design = np.column_stack([np.ones(known.sum()), layout.xy_mm[known]])
     drift_px = design @ np.linalg.lstsq(design, moved_px[known], rcond=None)[0]
     way, drift, bend = (
@@ -125,10 +127,10 @@ def motion_of(markers: Markers, rest_px: NDArray[Any], layout: Reference, most_p
     # the former rest frame has the noise of one frame, or less
     by_noise_px = MOST_BEND * _sigma_px(markers.cov_px2[known]) * float(np.sqrt(FRAMES + 1))
     limit = by_noise_px if most_px is None else most_px
-    return Motion(way, float("nan") if bend > limit else drift, bend, limit)
+    return WayFromRest(way, float("nan") if bend > limit else drift, bend, limit)
 
 
-def _require_untouched(motion: Motion, name: str) -> None:
+def _require_untouched(motion: WayFromRest, name: str) -> None:
     if motion.is_touched:
         raise TouchedError(
             f"{name}: no rest frame: something touches the pattern, which is bent by {motion.bend_px:.3f} px (RMS) "

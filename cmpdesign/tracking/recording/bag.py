@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Self
 
 from cmpdesign.files.atomic import Stage
@@ -61,11 +62,13 @@ class BagWriter:
         self._connections: dict[str, Any] = {}
 
     def __enter__(self) -> Self:
-        self._writer.open()
+        self._writer.__enter__()
         return self
 
-    def __exit__(self, *error: object) -> None:
-        self._writer.close()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._writer.__exit__(kind, error, trace)
 
     def add(self, messages: Iterable[TopicMessage], store: Any) -> None:
         """Write messages; ``store``: their types."""

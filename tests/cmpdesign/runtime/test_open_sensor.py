@@ -22,8 +22,8 @@ from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.runtime.events import EventKind
 from cmpdesign.runtime.pairing import nearest_places
+from cmpdesign.runtime.publish.serving import SensorServer
 from cmpdesign.runtime.sensor import LateError
-from cmpdesign.runtime.serving import SensorServer
 from cmpdesign.runtime.zero import TouchedError
 from cmpdesign.scene import Press
 from cmpdesign.sensor.tables import SensorError

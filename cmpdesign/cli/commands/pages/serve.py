@@ -53,7 +53,7 @@ def serve(
     """
     from cmpdesign.documents.runs import ServeDocument
     from cmpdesign.runtime.opening import open_sensor
-    from cmpdesign.runtime.serving import SensorServer
+    from cmpdesign.runtime.publish.serving import SensorServer
 
     with open_sensor(*sensors, outputs=output) as opened:
         if record is not None:

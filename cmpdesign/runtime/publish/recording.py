@@ -8,7 +8,7 @@ from threading import Event, Thread
 
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.atomic import Stage
-from cmpdesign.runtime.publishing import SensorRecorder
+from cmpdesign.runtime.publish.results import SensorRecorder
 from cmpdesign.runtime.sensor import Sensor
 from cmpdesign.tracking.recording.bag import BagWriter
 from cmpdesign.tracking.recording.topics import TopicMessages

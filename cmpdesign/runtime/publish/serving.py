@@ -5,7 +5,7 @@ from __future__ import annotations
 from threading import Event, Lock, Thread
 
 from cmpdesign.runtime.opening import Sensors
-from cmpdesign.runtime.publishing import SensorRecorder
+from cmpdesign.runtime.publish.results import SensorRecorder
 from cmpdesign.runtime.sensor import LateError, Sensor
 from cmpdesign.tracking.live.foxglove_server import FoxgloveServer
 from cmpdesign.tracking.live.options import Live
