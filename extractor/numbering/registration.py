@@ -23,6 +23,7 @@ from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
 from extractor.numbering.code_bits import Agreement, CodeBits
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
+from extractor.numbering.joined_parts import joined_to
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
     ATTACHMENT,
@@ -271,7 +272,7 @@ class Registration:
         certain = [one for one in placed if one.is_certain]
         if placed and not certain:
             fewest = min(placed, key=lambda one: len(one.tied) or MAX_TIED)
-            certain = self._with_all_parts(fewest, len(fewest.tied))
+            certain = self._joined(image, placed[0], bright) or self._with_all_parts(fewest, len(fewest.tied))
         for one in certain:
             numbering = self._number_with(one, placed)
             if numbering is not None:
@@ -336,6 +337,18 @@ class Registration:
             beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
             count += (q, r) != (0, 0) and bool((beside >= 0).all())
         return count
+
+    def _joined(self, image: _WalkedImage, placed: PlacedPart, bright: BrightPlaces) -> list[PlacedPart]:
+        """The part with a motion that is certain by the cells and bits of all parts joined to it; else nothing."""
+        if placed.bits is None:
+            return []
+        seen = placed.seen
+        cells = joined_to(seen.part, seen.cells, seen.fields.odds, self._lattice.layers)
+        if np.count_nonzero(cells.part == seen.part) == np.count_nonzero(placed.is_own):
+            return []
+        fields = ink_fields(image.view, cells, image.light, seen.part)
+        joined = self.register(seen._replace(cells=cells, fields=fields), bright)
+        return [joined._replace(seen=seen)] if joined.is_certain else []
 
     def _with_all_parts(self, placed: PlacedPart, count: int) -> list[PlacedPart]:
         """The part with a certain motion, if the other parts decide between its best motions; else nothing.

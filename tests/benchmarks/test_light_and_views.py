@@ -100,14 +100,17 @@ def test_motions_are_those_of_the_plane(seed: int, layers: int, share: float, bl
 
 def test_seen_cells_are_clear_of_covers_and_in_the_picture() -> None:
     picture = shoot(Chain(pose=Pose(layers=5, pitch_px=30.0)))
+    cells = colored_cells(picture.layout)
     covers = np.zeros(picture.image.shape[:2], np.uint8)
-    every = seen_cells(picture, covers)
+    every = seen_cells(picture, covers, cells)
     assert np.array_equal(every, colored_cells(picture.layout))
     covers[:, :320] = 1
-    clear = seen_cells(picture, covers)
+    clear = seen_cells(picture, covers, cells)
     left = picture.marker_xy_px[picture.layout.cell_corners[every]].min(axis=(1,))[:, 0]
     assert set(clear) >= set(every[left > 325]) and not set(clear) & set(every[left < 319])
-    aside = seen_cells(replace(picture, marker_xy_px=picture.marker_xy_px + (200, 0)), np.zeros_like(covers))
+    aside = seen_cells(
+        replace(picture, marker_xy_px=picture.marker_xy_px + (200, 0)), np.zeros_like(covers), cells
+    )
     assert 0 < len(aside) < len(every)
 
 
