@@ -181,8 +181,8 @@ def cells_at(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
 
 def cells_between_whites(lattice: Lattice) -> int:
     """The number of colored cells with two or three white cells at their sides, which may hide them."""
-    beside = (lattice.white_axial[:, None] + [[0, 0], [-1, 0], [-1, 1]]).reshape(-1, 2)
-    cells = cells_at(beside, lattice)
+    steps = np.array([[0, 0], [-1, 0], [-1, 1]], np.int32)  # to the up-cells that share a side
+    cells = cells_at((lattice.white_axial[:, None] + steps).reshape(-1, 2), lattice)
     return int((np.bincount(cells[cells >= 0]) > 1).sum())
 
 
