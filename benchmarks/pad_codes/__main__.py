@@ -7,9 +7,11 @@ from typing import Literal
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.parallel import PROCESSES
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.pad_codes.beside import CODE, SUITES, figures_of
 from benchmarks.pad_codes.crops import counted, read_crops
 from benchmarks.pad_codes.families import VIEWS, told_apart
 from benchmarks.pad_codes.parts import measured
+from benchmarks.pad_codes.times import CASES, least_ms
 from benchmarks.pad_codes.windows import placed_windows
 
 COLUMNS = {"parts": "d", "right": ".2%", "wrong": "d"}
@@ -22,7 +24,10 @@ CROP_COLUMNS = {
     "plain numbered": ".1%",
     "plain wrong ids": "d",
 }
-Part = Literal["all", "windows", "parts", "crops", "families"]
+BESIDE_COLUMNS = {
+    "pictures": "d", "unread": "d", "reported": ".1%", "wrong": "d", "RMS px": ".4f", "z": ".2f",
+}  # fmt: skip
+Part = Literal["all", "windows", "parts", "crops", "families", "beside", "times"]
 
 
 def measure(
@@ -32,6 +37,7 @@ def measure(
     parts: int = 100_000,
     crops: int = 120,
     pictures: int = 64,
+    readings: int = 40,
     seed: int = 5,
     processes: int = PROCESSES,
 ) -> Shown:
@@ -56,6 +62,10 @@ def measure(
         yield Table("crops of pads of 5 to 11 layers", {"in view": TEXT, **CROP_COLUMNS}, rows)
     if only in ("all", "families"):
         yield families_table(layers, pictures, seed)
+    if only in ("all", "beside"):
+        yield beside_table(pictures, seed, processes)
+    if only in ("all", "times"):
+        yield times_table(readings)
     return None
 
 
@@ -73,6 +83,33 @@ def families_table(layers: int, pictures: int, seed: int) -> Table:
             group = f"{pads} pads, {share:.0%} in view, {name}"
             rows.append((group, found.total(), found["right"] / found.total(), found["wrong"]))
     return Table(f"pads of a family, {layers} layers", {"pictures of": TEXT, **COLUMNS}, rows)
+
+
+def beside_table(pictures: int, seed: int, processes: int) -> Table:
+    rows = []
+    for suite in SUITES:
+        for name, code in (("coded", CODE), ("plain", 0)):
+            found = figures_of(suite, code, pictures, seed, processes)
+            row = found.unread, found.reported, found.wrong, found.rms_px, found.z
+            rows.append((f"{suite}, {name}", pictures, *row))
+    return Table("coded pads and plain ones", {"pads": TEXT, **BESIDE_COLUMNS}, rows)
+
+
+def times_table(readings: int) -> Table:
+    rows = []
+    for case in CASES:
+        plain, coded = least_ms(case, readings)
+        size = f"{case.size[0]} x {case.size[1]}"
+        rows.append((case.layers, case.pitch_px, size, plain, coded, coded - plain))
+    columns = {
+        "layers": "d",
+        "edges px": "g",
+        "picture": TEXT,
+        "plain ms": ".2f",
+        "coded ms": ".2f",
+        "more ms": "+.2f",
+    }
+    return Table("processor time", columns, rows)
 
 
 main = Experiment("pad_codes", measure)

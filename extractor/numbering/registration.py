@@ -43,7 +43,7 @@ SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, 
 MAX_TIED = 60  # motions between which the other parts may decide; chosen, for time
 OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
-JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
+JOINT_LEAD = 45.0  # the same where other parts decide: 15 cells; they are not independent. Chosen
 MIN_NUMBERED_SHARE = 0.5  # of the cells of large parts; with fewer, all motions are compared. Chosen
 ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
 
@@ -272,7 +272,7 @@ class Registration:
         certain = [one for one in placed if one.is_certain]
         if placed and not certain:
             fewest = min(placed, key=lambda one: len(one.tied) or MAX_TIED)
-            certain = self._joined(image, placed[0], bright) or self._with_all_parts(fewest, len(fewest.tied))
+            certain = self._decided_by_all(image, fewest, bright)
         for one in certain:
             numbering = self._number_with(one, placed)
             if numbering is not None:
@@ -338,17 +338,21 @@ class Registration:
             count += (q, r) != (0, 0) and bool((beside >= 0).all())
         return count
 
-    def _joined(self, image: _WalkedImage, placed: PlacedPart, bright: BrightPlaces) -> list[PlacedPart]:
-        """The part with a motion that is certain by the cells and bits of all parts joined to it; else nothing."""
-        if placed.bits is None:
-            return []
+    def _decided_by_all(
+        self, image: _WalkedImage, placed: PlacedPart, bright: BrightPlaces
+    ) -> list[PlacedPart]:
+        """The part with a motion that is certain by the cells and bits of all parts; else nothing.
+
+        Parts that can be joined to the part without the layout have one motion with the part, and no vote of their own.
+        """
         seen = placed.seen
         cells = joined_to(seen.part, seen.cells, seen.fields.odds, self._lattice.layers)
-        if np.count_nonzero(cells.part == seen.part) == np.count_nonzero(placed.is_own):
-            return []
-        fields = ink_fields(image.view, cells, image.light, seen.part)
-        joined = self.register(seen._replace(cells=cells, fields=fields), bright)
-        return [joined._replace(seen=seen)] if joined.is_certain else []
+        if np.count_nonzero(cells.part == seen.part) > np.count_nonzero(placed.is_own):
+            fields = ink_fields(image.view, cells, image.light, seen.part)
+            placed = self.register(seen._replace(cells=cells, fields=fields), bright)
+        is_certain = placed.is_certain and (placed.bits is not None or placed.lead >= JOINT_LEAD)
+        found = [placed] if is_certain else self._with_all_parts(placed, len(placed.tied))
+        return [one._replace(seen=seen) for one in found]
 
     def _with_all_parts(self, placed: PlacedPart, count: int) -> list[PlacedPart]:
         """The part with a certain motion, if the other parts decide between its best motions; else nothing.
