@@ -26,7 +26,7 @@ from extractor.complete.image_quality import (
     measure_quality_without_numbers,
     sampled_cells,
 )
-from extractor.complete.repair import repair_markers
+from extractor.complete.repair import RepairedMarkers, repair_markers
 from extractor.complete.reported_share import is_less_than_half_reported
 from extractor.complete.row_breaks import beside_row_break, find_row_break
 from extractor.complete.virtual_markers import locate_virtual_markers
@@ -48,6 +48,7 @@ from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
+from extractor.refine.relief import without_parallax
 from extractor.result import Markers, Origin, Reason
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
@@ -327,8 +328,12 @@ class Extractor:
         refined = stages.record("refine", pad.refiner(pyramid, places, before))
         repaired = repair_markers(refined, places, pad.lattice, size)
         rows = find_row_break(topology, repaired, size)
-        repaired = stages.record("repair", beside_row_break(rows, repaired))
-        virtual = partial(locate_virtual_markers, topology, repaired, refined.points, refined.scatter)
+        repaired = beside_row_break(rows, repaired)
+        xy, cov, points = without_parallax(
+            refined.appearance.parallax, repaired.xy_px, repaired.cov_px2, refined.points
+        )
+        repaired = stages.record("repair", RepairedMarkers(xy, cov, repaired.status))
+        virtual = partial(locate_virtual_markers, topology, repaired, points, refined.scatter)
         few = is_less_than_half_reported(repaired.xy_px, layout.xy_mm, pad.lattice.present, size)
         view, edges = pyramid.level(1), topology.edges
         quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)
