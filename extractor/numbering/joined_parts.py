@@ -16,13 +16,13 @@ from extractor._native import numbering as native
 from extractor.layout.lattice import NEIGHBOUR_STEPS
 from extractor.layout.lattice_tables import LayoutCells, cell_lookup_table
 from extractor.numbering.lattice_walk import WalkedCells
-from extractor.numbering.witnesses import ATTACHMENT
 
 CORNER_STEPS = (
     np.array([[-1, -1], [2, -1], [-1, 2]]) / 3.0
 )  # from the center of an up-cell, in steps of the lattice
 LATTICE_STEPS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])  # of q and r, in edges
 TURNS = 3
+NO_MOTION = np.zeros(3, np.int32)
 
 
 class Plane(NamedTuple):
@@ -67,10 +67,10 @@ def joined_to(part: int, cells: WalkedCells, odds: NDArray[np.float64], layers: 
     """
     plane = plane_of(2 * layers + 2)  # no cell of a pattern is farther from another one
     own = cells.part == part
-    cell = np.full(len(own), -1, np.int32)
-    cell[own] = native.moved_cells(np.ascontiguousarray(cells.axial[own]), 0, 0, 0, plane.cell_lookup)
-    limits = ATTACHMENT._replace(with_single_cells=False)
-    cell = native.attach_parts(cells, cell, odds, plane.cells, plane.axial, plane.cell_lookup, limits)
+    cell = native.moved_cells(cells, part, NO_MOTION, plane.cell_lookup)
+    cell = native.attach_parts(
+        cells, cell, odds, plane.cells, plane.axial, plane.cell_lookup, with_single_cells=False
+    )
     axial, first = cells.axial.copy(), cells.first.copy()
     for other in np.unique(cells.part[(cell >= 0) & ~own]):
         chosen = (cells.part == other) & (cell >= 0)
