@@ -109,13 +109,6 @@ class ContactReader:
         self.young_share = float(young_sigma_mpa) / self.young_mpa
         self.about_mm = np.asarray(about_mm, np.float64)
         self._axes, self._solver = 3, TractionSolver(gel)
-        offset = self.layout.xy_mm[:, None] - gel.loads_mm
-        self._at_markers = np.exp(-0.5 * (offset**2).sum(axis=2) / gel.width_mm**2)
-        offset = gel.loads_mm[:, None] - gel.loads_mm
-        self._at_loads = np.exp(-0.5 * (offset**2).sum(axis=2) / gel.width_mm**2)
-        # the tractions of neighbouring loads scatter; the field of regions is smoothed to one spacing
-        smooth = (SMOOTH_SPACINGS * gel.spacing_mm) ** 2
-        self._smooth = gel.width_mm**2 / smooth * np.exp(-0.5 * (offset**2).sum(axis=2) / smooth)
         self._rim_mm = _distance_inside(gel.outline_mm, gel.loads_mm)
         self._support: NDArray[np.intp] | None = None
 
@@ -185,9 +178,8 @@ class ContactReader:
     def _answer(self, solution: Solution) -> ContactForce:
         support, gel = solution.support, self.gel
         force = self.young_mpa * solution.traction * gel.area_mm2[support, None]
-        traction = np.zeros((len(gel.loads_mm), 3))
-        traction[support] = self.young_mpa * solution.traction
-        patches = find_patches(gel, self._smooth @ -traction[:, 2], support, -force[:, 2])
+        peak = self.young_mpa * solution.traction
+        patches = find_patches(gel, self._smoothed(support, -peak[:, 2]), support, -force[:, 2])
         doubt = np.zeros(len(support))
         for patch in patches:
             mine = patch.members
@@ -196,7 +188,7 @@ class ContactReader:
             factor = 1 + self.model.strain_factor * min(load, self.model.largest_load) ** 2
             doubt[mine] = self.model.strain_sigma * load**2 * force[mine, 2]
             force[mine, 2] *= factor
-            traction[support[mine], 2] *= factor
+            peak[mine, 2] *= factor
         loads = _Loads(support, force, doubt)
         noise = solution.inverse * (self.model.noise_factor * self.young_mpa) ** 2 * solution.chi**2
         whole = self._summed(np.arange(len(support)), loads, noise)
@@ -211,11 +203,17 @@ class ContactReader:
             about_mm=self.about_mm,
             regions=tuple(sorted(regions, key=lambda region: float(region.force_n[2]))),
             loads_mm=gel.loads_mm,
-            traction_mpa=self._at_loads @ traction,
-            marker_traction_mpa=self._at_markers @ traction,
+            traction_mpa=_gaussians(gel.loads_mm, gel.loads_mm[support], gel.width_mm) @ peak,
+            marker_traction_mpa=_gaussians(self.layout.xy_mm, gel.loads_mm[support], gel.width_mm) @ peak,
             utilisation=np.nan if self.friction is None else shear / (self.friction * -float(whole.force[2])),
             misfit=solution.chi,
         )
+
+    def _smoothed(self, support: NDArray[np.intp], peak_mpa: Array) -> Array:
+        """(K,) pressure at the loads. The tractions of neighbouring loads scatter, so it is smoothed."""
+        width = SMOOTH_SPACINGS * self.gel.spacing_mm
+        loads = self.gel.loads_mm
+        return (self.gel.width_mm / width) ** 2 * _gaussians(loads, loads[support], width) @ peak_mpa
 
     def _summed(self, members: NDArray[np.intp], loads: _Loads, noise: Array) -> _Sum:
         area = self.gel.area_mm2[loads.support[members]]
@@ -290,6 +288,12 @@ class _Sum:
     force_cov: Array
     torque: Array
     torque_cov: Array
+
+
+def _gaussians(points_mm: Array, centres_mm: Array, width_mm: float) -> Array:
+    """(N, S) values at points of Gaussians of peak 1 around centres."""
+    squares = ((points_mm[:, None] - centres_mm) ** 2).sum(axis=2)
+    return np.asarray(np.exp(squares / (-2 * width_mm**2)))
 
 
 def _distance_inside(outline_mm: Array, points_mm: Array) -> Array:
