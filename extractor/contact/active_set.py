@@ -108,6 +108,7 @@ class TractionSolver:
         if largest < self._limits.gain_elsewhere:
             return None
         support = self._cold_start(measured) if start is None or not len(start) else start
+        tried = np.zeros(len(gain), np.bool_)
         for _ in range(self._limits.rounds):
             support, traction, inverse, residual = self._settle(white, whitening, support)
             chi = max(1.0, float(np.sqrt((residual**2).sum() / known)))
@@ -116,7 +117,9 @@ class TractionSolver:
             beside = np.zeros(len(gain) + 1, np.bool_)
             beside[self._neighbours[support].ravel()] = True
             limit = np.where(beside[:-1], self._limits.gain_beside, self._limits.gain_elsewhere)
-            wanted = gain > chi * limit
+            # a load joins once: one that left again would join and leave for ever
+            wanted = (gain > chi * limit) & ~tried
+            tried |= wanted
             stray = self._strays(support, traction, inverse, chi)
             if not wanted.any() and not stray.any():
                 break
