@@ -135,6 +135,8 @@ class TractionSolver:
         """
         parts = _connected(support, self._neighbours)
         stray = np.zeros(len(support), np.bool_)
+        if parts.max(initial=0) == 0:
+            return stray
         gains = []
         for part in range(int(parts.max(initial=-1)) + 1):
             rows = 3 * np.flatnonzero(parts == part) + 2

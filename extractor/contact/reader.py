@@ -194,8 +194,9 @@ class ContactReader:
         scale = np.array([self.model.noise_sideways, self.model.noise_sideways, self.model.noise_upright])
         deviation = np.tile(scale * (self.young_mpa * solution.chi), len(support))
         noise = solution.inverse * np.outer(deviation, deviation)
-        whole = self._summed(np.arange(len(support)), loads, noise)
-        regions = tuple(self._region(patch, loads, noise) for patch in patches)
+        parts = [self._summed(patch.members, loads, noise) for patch in patches]
+        whole = parts[0] if len(parts) == 1 else self._summed(np.arange(len(support)), loads, noise)
+        regions = tuple(self._region(*each, loads, noise) for each in zip(patches, parts, strict=True))
         shear = float(np.hypot(*whole.force[:2]))
         return ContactForce(
             reason=self._reason(whole, patches, support),
@@ -228,8 +229,8 @@ class ContactReader:
     def _summed(self, members: NDArray[np.intp], loads: _Loads, noise: Array) -> _Sum:
         area = self.gel.area_mm2[loads.support[members]]
         arm, part = loads.place_mm[members] - self.about_mm, loads.force_n[members]
-        total, torque = part.sum(axis=0), np.cross(arm, part).sum(axis=0)
         turning = np.concatenate([np.broadcast_to(np.eye(3), (len(members), 3, 3)), _crossing(arm)], axis=1)
+        total, torque = np.split(np.einsum("sij,sj->i", turning, part), 2)
         to_wrench = (turning * area[:, None, None]).transpose(1, 0, 2).reshape(6, -1)
         rows = (3 * members[:, None] + np.arange(3)).ravel()
         cov = to_wrench @ noise[np.ix_(rows, rows)] @ to_wrench.T
@@ -241,7 +242,7 @@ class ContactReader:
         centre = share @ arm
         by_force, by_place = _crossing(centre[None])[0], _crossing(total[None])[0]
         place = model.centre_error * self._radius(loads.place_mm[members, :2], share)
-        about_centre = torque - np.cross(centre, total)
+        about_centre = torque - by_force @ total
         own_torque = by_force @ own @ by_force.T + place**2 * by_place @ by_place.T
         own_torque += np.diag((model.torque_error * about_centre) ** 2)
         return _Sum(total, cov[:3, :3] + own, torque, cov[3:, 3:] + own_torque)
@@ -251,8 +252,7 @@ class ContactReader:
         spread = share @ ((at_mm - share @ at_mm) ** 2).sum(axis=1)
         return max(float(np.sqrt(HERTZ * spread)), self.gel.spacing_mm)
 
-    def _region(self, patch: Patch, loads: _Loads, noise: Array) -> Region:
-        whole = self._summed(patch.members, loads, noise)
+    def _region(self, patch: Patch, whole: _Sum, loads: _Loads, noise: Array) -> Region:
         at = self.gel.loads_mm[loads.support[patch.members]]
         press = -loads.force_n[patch.members, 2]
         centre = press @ at / press.sum()
@@ -298,13 +298,16 @@ class _Sum:
 
 def _gaussians(points_mm: Array, centres_mm: Array, width_mm: float) -> Array:
     """(N, S) values at points of Gaussians of peak 1 around centres."""
-    squares = ((points_mm[:, None] - centres_mm) ** 2).sum(axis=2)
-    return np.asarray(np.exp(squares / (-2 * width_mm**2)))
+    x, y = (np.subtract.outer(points_mm[:, k], centres_mm[:, k]) for k in (0, 1))
+    return np.asarray(np.exp((x * x + y * y) / (-2 * width_mm**2)))
 
 
 def _crossing(arms: Array) -> Array:
     """(N, 3, 3) matrices that turn forces into torques at arms (N, 3)."""
-    return np.cross(arms[:, None], np.eye(3)).transpose(0, 2, 1)
+    matrix = np.zeros((len(arms), 3, 3))
+    matrix[:, [1, 2, 0], [2, 0, 1]] = -arms
+    matrix[:, [2, 0, 1], [1, 2, 0]] = arms
+    return matrix
 
 
 def _distance_inside(outline_mm: Array, points_mm: Array) -> Array:
