@@ -36,7 +36,7 @@ COLUMNS = {
 QUANTITIES = {
     "Fz": ("normal", "normal_z"), "shear / press": ("shear", "shear_z"), "shear / shear": ("of_shear", ""),
     "torque": ("torque", "torque_z"), "centre, mm": ("centre_mm", "centre_z"), "radius": ("radius", ""),
-    "utilisation": ("utilisation", ""),
+    "utilisation": ("utilisation", ""), "number of regions": ("regions_off", ""),
 }  # fmt: skip
 
 
@@ -61,6 +61,7 @@ class Errors(NamedTuple):
     radius: float
     utilisation: float
     regions: int
+    regions_off: int
     times_ms: tuple[float, float]
 
 
@@ -95,6 +96,7 @@ def errors_of(found: ContactForce, frame: dict[str, Array], name: str, times_ms:
         radius=np.nan if name in FLAT else float(np.sqrt(area_mm2 / np.pi)) / radius_mm - 1,
         utilisation=found.utilisation - float(frame["utilisation"]),
         regions=len(found.regions),
+        regions_off=len(found.regions) - (2 if name == "two balls" else 1),
         times_ms=(times_ms[0], times_ms[1]),
     )
 
@@ -113,6 +115,7 @@ def read_case(
     random: np.random.Generator,
     far_mm: float | None = None,
     depth_mm: float = 0.5,
+    lost: float = 0.0,
 ) -> Iterator[Errors]:
     """The frames of a contact, read from two views' displacements, or from one view far away."""
     seen = seen_from(reader_of(case.thickness_mm, case.poisson, depth_mm), far_mm)
@@ -122,7 +125,7 @@ def read_case(
         seen.reader.reset()
         for _ in range(2):
             start = time.process_time()
-            found = seen.read(moved, random)
+            found = seen.read(moved, random, lost)
             times_ms.append(1e3 * (time.process_time() - start))
         yield errors_of(found, frame, case.name, times_ms)
 
@@ -161,6 +164,8 @@ def measure(
     one_view: float | None = None,
     only: tuple[str, ...] = (),
     depth_mm: float = 0.5,
+    lost: float = 0.0,
+    rest: int = 2000,
     noises: int = 4,
     seed: int = 1,
 ) -> Shown:
@@ -170,6 +175,8 @@ def measure(
         one_view: distance of a single camera, mm; two views without it.
         only: names of contacts; all by default.
         depth_mm: of the markers: 0, 0.5 or 1.
+        lost: share of the markers that have no displacement.
+        rest: frames at rest in which a force is sought.
         noises: draws of the measurements' noise; the rows are those of the first draw.
     """
     with np.load(TRUTH) as file:
@@ -181,12 +188,15 @@ def measure(
             mine = np.flatnonzero(truth["case"] == case.name)
             if len(mine) and (not only or case.name in only):
                 frames = [{key: values[k] for key, values in truth.items()} for k in mine]
-                found += read_case(case, frames, random, one_view, depth_mm)
+                found += read_case(case, frames, random, one_view, depth_mm, lost)
         if turn == 0:
             yield Table("frames", COLUMNS, [row_of(one) for one in found])
     yield summary([one for one in found if one.press_n > LEAST_N])
     times_ms = np.array([one.times_ms for one in found]).reshape(noises, -1, 2).min(axis=0)
     cold_ms, warm_ms = np.median(times_ms, axis=0)
+    still = seen_from(reader_of(4.0, 0.5, depth_mm), one_view)
+    touched = sum(still.read(np.zeros((len(still.reader.layout.xy_mm), 3)), random).regions != () for _ in range(rest))
+    yield f"at rest: a force in {touched} of {rest} frames"
     yield f"CPU of a frame, least of {noises}, median: cold {cold_ms:.1f} ms, warm {warm_ms:.1f} ms"
 
 

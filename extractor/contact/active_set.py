@@ -25,7 +25,8 @@ class Limits:
     """Thresholds of the active set.
 
     Attributes:
-        tau: standard deviation of the peak tractions before the measurement, in Young's moduli. Chosen; not sensitive.
+        tau: standard deviation of the peak tractions before the measurement, in Young's moduli. Measured:
+            python -m benchmarks.force, half or twice as much makes the force of a thin layer scatter more.
         gain_beside, gain_elsewhere: gain in units of chi above which a load beside the support, or elsewhere, is added.
             Chosen.
         rounds: additions to the support at most. Chosen.
@@ -33,7 +34,7 @@ class Limits:
         seed_share: share of the largest pressure above which a load of the cold start belongs to the support. Chosen.
     """
 
-    tau: float = 0.5
+    tau: float = 0.25
     gain_beside: float = 3.0
     gain_elsewhere: float = 12.0
     rounds: int = 12

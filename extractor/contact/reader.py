@@ -34,13 +34,15 @@ class ForceModel:
     """What the linear model of a gel is worth.
 
     Attributes:
-        strain_factor, strain_sigma: the normal force of a region is the linear one times 1 + ``strain_factor``
-            (F / (A E))^2; and the factor's deviation. Measured: python -m benchmarks.force.stiffening, a neo-Hookean
-            layer under balls, without the frames of ``benchmarks.force``.
+        strain_factor, strain_sigma: the normal force of a region of radius a on a gel of thickness h is the linear one
+            times 1 + ``strain_factor`` (a / h) (F / (A E))^2; and the factor's deviation. Measured:
+            python -m benchmarks.force, by the half of its contacts that is named so.
+        narrow_error: the same force's deviation, as a share, where a contact's radius is one spacing of loads; it falls
+            with the radius' square. Measured: the same command.
         noise_sideways, noise_upright: factors of the noise's deviation in x and y, and in z, because the support is
-            estimated too. Measured: python -m benchmarks.force.deviations.
+            estimated too. Measured: the same command.
         normal_error, shear_error, torque_error: the model's own deviation, as a share: of the normal force, of the
-            shear, and of the torque about the centre of pressure. Measured: python -m benchmarks.force.deviations.
+            shear, and of the torque about the centre of pressure. Measured: the same command.
         shear_by_press: the same of the shear, as a share of the normal force. Measured: the same command.
         centre_error: the same of the place of the force, as a share of the contact's radius. Measured: the same command.
         largest_load: F / (A E) above which the frame has a reason. Measured: python -m benchmarks.force.stiffening,
@@ -50,15 +52,16 @@ class ForceModel:
             reason. Chosen.
     """
 
-    strain_factor: float = 0.4
+    strain_factor: float = 0.7
     strain_sigma: float = 0.2
+    narrow_error: float = 0.05
     noise_sideways: float = 1.3
     noise_upright: float = 2.2
-    normal_error: float = 0.02
+    normal_error: float = 0.015
     shear_error: float = 0.025
     torque_error: float = 0.03
     shear_by_press: float = 0.002
-    centre_error: float = 0.025
+    centre_error: float = 0.008
     largest_load: float = 0.65
     fewest_known: float = 0.5
     rim_spacings: float = 2.0
@@ -185,9 +188,12 @@ class ContactReader:
         for patch in patches:
             mine = patch.members
             load = -force[mine, 2].sum() / (patch.area_mm2 * self.young_mpa)
+            width = float(np.sqrt(patch.area_mm2 / np.pi)) / gel.thickness_mm
             # beyond the computed range, which the reason states, the factor does not grow
-            factor = 1 + self.model.strain_factor * min(load, self.model.largest_load) ** 2
-            doubt[mine] = self.model.strain_sigma * load**2 * force[mine, 2]
+            factor = 1 + self.model.strain_factor * width * min(load, self.model.largest_load) ** 2
+            narrow = gel.spacing_mm / (width * gel.thickness_mm)
+            error = np.hypot(self.model.strain_sigma * width * load**2, self.model.narrow_error * narrow**2)
+            doubt[mine] = error * force[mine, 2]
             force[mine, 2] *= factor
             peak[mine, 2] *= factor
         loads = _Loads(support, self._places(solution), force, doubt)
