@@ -26,7 +26,9 @@ from extractor import ContactForce, ContactReader
 
 Array = NDArray[np.float64]
 LEAST_N = 0.3  # of the summary's frames
-LEAST_SHEAR = 0.1  # of the press, above which a frame has a shear and can have an error as a share of the shear
+LEAST_SHEAR = (
+    0.1  # of the press, above which a frame has a shear and can have an error as a share of the shear
+)
 FLAT = ("twist", "punch", "ring")  # their touched area is not that of a ball
 COLUMNS = {
     "contact": TEXT, "Fz, N": ".3f", "shear / Fz": ".2f", "Fz error": "+.1%", "z": "+.1f", "shear": ".1%",
@@ -195,7 +197,9 @@ def measure(
     times_ms = np.array([one.times_ms for one in found]).reshape(noises, -1, 2).min(axis=0)
     cold_ms, warm_ms = np.median(times_ms, axis=0)
     still = seen_from(reader_of(4.0, 0.5, depth_mm), one_view)
-    touched = sum(still.read(np.zeros((len(still.reader.layout.xy_mm), 3)), random).regions != () for _ in range(rest))
+    touched = sum(
+        still.read(np.zeros((len(still.reader.layout.xy_mm), 3)), random).regions != () for _ in range(rest)
+    )
     yield f"at rest: a force in {touched} of {rest} frames"
     yield f"CPU of a frame, least of {noises}, median: cold {cold_ms:.1f} ms, warm {warm_ms:.1f} ms"
 

@@ -168,11 +168,11 @@ class NeoHookeanBlock:
 
     def _expected(self, pose: Pose) -> _Contact:
         """The contact after the object's motion to a pose, linearised where the block is: the same places touch."""
-        last = self.last if self.last.pressure.any() else self._contact(self.u, pose)
-        if last is not self.last:
-            return last
+        last = self.last
+        if not last.pressure.any():
+            return self._contact(self.u, pose)
         x = self._face_points() + self.face_u
-        (now, turned), (before, turn) = self._object_frame(x, pose), self._object_frame(x, self.pose)
+        (now, _), (before, turn) = self._object_frame(x, pose), self._object_frame(x, self.pose)
         carried = (before - now) @ turn.T
         return last._replace(traction=last.traction - np.einsum("nij,nj->ni", last.stiffness, carried))
 
@@ -210,7 +210,10 @@ class NeoHookeanBlock:
         trial = np.einsum("nij,nj->ni", flat, pull)
         # The limit is that of the pressure before this increment, and the way from sticking to slipping is smooth:
         # both keep Newton's method convergent, and the tractions are in equilibrium with the block all the same.
-        limit = self.friction * (self.last.pressure if self.last is not None else pressure) + LEAST_LIMIT * self.young
+        limit = (
+            self.friction * (self.last.pressure if self.last is not None else pressure)
+            + LEAST_LIMIT * self.young
+        )
         root = np.sqrt(limit**2 + (trial**2).sum(axis=1))
         ratio = np.where(touching, limit / root, 0.0)
         tangent = ratio[:, None] * trial

@@ -69,7 +69,12 @@ def cases() -> tuple[Case, ...]:
         Case("spun ball", _ball(6, -3.0, -1.6), spun),
         Case("two balls", pair, two, fine_mm=0.75, fine_radius_mm=1.2, fitted=True),
         Case("punch", punch, (*_presses(0.15, 0.3, 0.5), Pose(0.2, 0, -0.5)), fine_radius_mm=2.5),
-        Case("oblique", _ball(4, 3, -2), tuple(Pose(0.6 * s, 0.3 * s, -s) for s in (0.3, 0.6, 0.9)), fitted=True),
+        Case(
+            "oblique",
+            _ball(4, 3, -2),
+            tuple(Pose(0.6 * s, 0.3 * s, -s) for s in (0.3, 0.6, 0.9)),
+            fitted=True,
+        ),
         Case("thin layer", _ball(5, 1, 1), thin, thickness_mm=2.0, fitted=True),
         Case("nu .49", _ball(5), (*_presses(0.4, 0.8), Pose(0.3, 0, -0.8)), poisson=0.49),
         Case("rim", _ball(4, 11.0, 0.5), (*_presses(0.3, 0.6), Pose(0.3, 0, -0.6))),

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.contact.active_set import Solution, TractionSolver
+from extractor.contact.active_set import LIMITS, Solution, TractionSolver
 from extractor.contact.gel import Gel
 from extractor.contact.regions import AREA_ERROR, HERTZ, Patch, find_patches
 from extractor.contact.result import ContactForce, ContactReason, Region
@@ -44,7 +44,8 @@ class ForceModel:
         normal_error, shear_error, torque_error: the model's own deviation, as a share: of the normal force, of the
             shear, and of the torque about the centre of pressure. Measured: the same command.
         shear_by_press: the same of the shear, as a share of the normal force. Measured: the same command.
-        centre_error: the same of the place of the force, as a share of the contact's radius. Measured: the same command.
+        centre_error: the same of the force's place, as a share of the contact's radius. Measured: the same command.
+        centre_by_shear: the same of the centre, times shear over press. Measured: the same command.
         largest_load: F / (A E) above which the frame has a reason. Measured: python -m benchmarks.force.stiffening,
             whose states end there.
         fewest_known: share of the markers that must have a displacement. Chosen.
@@ -62,6 +63,7 @@ class ForceModel:
     torque_error: float = 0.03
     shear_by_press: float = 0.002
     centre_error: float = 0.008
+    centre_by_shear: float = 0.05
     largest_load: float = 0.65
     fewest_known: float = 0.5
     rim_spacings: float = 2.0
@@ -70,6 +72,8 @@ class ForceModel:
 MODEL = ForceModel()
 # In one image a large strain does not make the force too small: python -m benchmarks.force.stiffening --one-view 60.
 ONE_VIEW = replace(MODEL, strain_factor=0.0)
+# One image tells less of the pressure than two: beyond the model's range a narrower prior would change the force.
+ONE_VIEW_LIMITS = replace(LIMITS, tau=0.5)
 SMOOTH_SPACINGS = 0.8  # width of the smoothed loads; chosen
 LEAST_SIGMAS = 3.0  # of the force, below which it is too little
 
@@ -126,7 +130,7 @@ class ContactReader:
         other = copy(self)
         other.model = model
         other._axes = by_displacement.shape[1]
-        other._solver = TractionSolver(self.gel, by_displacement)
+        other._solver = TractionSolver(self.gel, by_displacement, ONE_VIEW_LIMITS)
         other.reset()
         return other
 
@@ -264,7 +268,9 @@ class ContactReader:
         centre = press @ at / press.sum()
         rows = 3 * patch.members + 2
         by_load = (at - centre) * (self.gel.area_mm2[loads.support[patch.members]] / press.sum())[:, None]
-        place = self.model.centre_error * self._radius(at, press / press.sum())
+        slant = float(np.hypot(*whole.force[:2]) / press.sum())
+        place = np.hypot(self.model.centre_error, self.model.centre_by_shear * slant)
+        place *= self._radius(at, press / press.sum())
         cov = by_load.T @ noise[np.ix_(rows, rows)] @ by_load + place**2 * np.eye(2)
         return Region(
             patch.area_mm2, AREA_ERROR * patch.area_mm2, patch.outline_mm, centre, cov,
