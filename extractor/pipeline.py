@@ -26,7 +26,7 @@ from extractor.complete.image_quality import (
     measure_quality_without_numbers,
     sampled_cells,
 )
-from extractor.complete.repair import repair_markers
+from extractor.complete.repair import RepairedMarkers, repair_markers
 from extractor.complete.reported_share import is_less_than_half_reported
 from extractor.complete.row_breaks import beside_row_break, find_row_break
 from extractor.complete.virtual_markers import locate_virtual_markers
@@ -48,6 +48,7 @@ from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
+from extractor.refine.relief import without_parallax
 from extractor.result import Markers, Origin, Reason
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
@@ -191,30 +192,11 @@ class _Pad:
         _ = self.refiner, self.sampled_cells
 
 
-class Extractor:
-    """Finds and numbers the markers of one layout, or of the pads of a family, in images. Can be pickled and copied.
-
-    >>> from extractor import Extractor
-    >>> markers = Extractor("layout.json").extract(image)  # doctest: +SKIP
-    >>> markers = Extractor(["left.json", "right.json"]).extract(image)  # doctest: +SKIP
-    >>> markers.code  # doctest: +SKIP
+class ImageReader:
+    """Reads the images of one layout or family stage by stage, for extractors and trackers.
 
     Args:
-        layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
-            a layout of cmpdesign. Or a list of these, a family: pads that differ in their codes alone. An image is of
-            one of them, and ``Markers.code`` says of which one.
-        preset: "balanced" or "accurate".
-        response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
-            of the light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
-        side: the side of the pattern that images show: "front", "back", or "designed": the side that the layout's
-            ``mirrored`` states. An image of the other side gives no markers, and a reason. "either": both sides are
-            read.
-        channels: the order of an image's colors: "bgr", as in OpenCV, or "rgb".
-
-    Raises:
-        LayoutError: the layout is not a triangular pattern, its file cannot be read, or layouts are no family.
-        TypeError: ``layout`` is of another type.
-        ValueError: no such preset, response, side or order of channels.
+        layout, preset, response, side, channels: see ``Extractor``.
     """
 
     def __init__(
@@ -238,7 +220,7 @@ class Extractor:
         ):
             if value not in allowed:
                 raise ValueError(f"{name} is {value!r}; give one of {', '.join(allowed)}")
-        self._options = preset, response, side, channels
+        self.options = preset, response, side, channels
         self._channels = channels
         self._mirrored = is_mirrored(layout, side)
         by_depth: dict[np.dtype[Any], Response] = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
@@ -253,34 +235,15 @@ class Extractor:
         self._efforts = EFFORTS if layout.code is None else CODED_EFFORTS
         self._pads[0].prepare()
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is made from layout and options; buffers are not copied."""
-        return type(self), (self.layouts, *self._options)
-
-    def layout_of(self, markers: Markers) -> Reference:
-        """The layout of the pad that markers are of; of a family without a numbered pad, the first one."""
-        return next((one for one in self.layouts if one.code and one.code.id == markers.code), self.layout)
-
-    def extract(self, image: NDArray[Any]) -> Markers:
-        """The markers in one image, found independently of other frames.
-
-        Args:
-            image: (H, W, 3) uint8, colors in the order of ``channels``; also uint16 of either byte order (scaled to 8
-                bits), with alpha (dropped) and grayscale (without color no marker is found; the reason is
-                ``NO_COLOR``). Need not be contiguous.
-
-        Raises:
-            ImageError: another dtype or shape, or a side below 16 px.
-        """
-        return self.read(image).markers
-
     def read(self, image: NDArray[Any]) -> ReadImage:
-        """``extract``, with the appearance that a tracker needs for the next image."""
+        """The markers in one image, with the appearance that a tracker needs for the next image."""
         stages = Stages()
-        bgr = stages.record("image", self.to_bgr(image))
-        if bgr is None:
+        return self.read_pyramid(self.pyramid(image, stages), stages)
+
+    def read_pyramid(self, pyramid: Pyramid | None, stages: Stages) -> ReadImage:
+        """``read`` of an image that is converted; None: without color."""
+        if pyramid is None:
             return ReadImage(no_markers(self.layout, Reason.NO_COLOR, stages), None)
-        pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Unnumbered):
             quality = measure_quality_without_numbers(pyramid.level(1), found.edge_px)
@@ -296,13 +259,12 @@ class Extractor:
         numbered = NumberedMarkers(places, numbering.mirrored, numbering.origin, numbering.pad)
         return self.finish(pyramid, numbered, stages)
 
-    def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:
-        """An image for ``extract`` as contiguous (H, W, 3) uint8 BGR, None without color; raises ``ImageError``."""
-        return convert_to_bgr(image, self._channels)
-
-    def pyramid(self, bgr: NDArray[np.uint8], depth: np.dtype[Any]) -> Pyramid:
-        """The image (H, W, 3) at several scales, with the response of images of a ``depth``, uint8 or uint16."""
-        return Pyramid(bgr, self._tables[depth.newbyteorder("=")])
+    def pyramid(self, image: NDArray[Any], stages: Stages | None = None) -> Pyramid | None:
+        """An image for ``Extractor.extract`` at several scales, None without color; raises ``ImageError``."""
+        bgr = convert_to_bgr(image, self._channels)
+        if stages is not None:
+            stages.record("image", bgr)
+        return None if bgr is None else Pyramid(bgr, self._tables[image.dtype.newbyteorder("=")])
 
     def finish(
         self, pyramid: Pyramid, numbered: NumberedMarkers, stages: Stages, before: Appearance | None = None
@@ -320,8 +282,12 @@ class Extractor:
         refined = stages.record("refine", pad.refiner(pyramid, places, before))
         repaired = repair_markers(refined, places, pad.lattice, size)
         rows = find_row_break(topology, repaired, size)
-        repaired = stages.record("repair", beside_row_break(rows, repaired))
-        virtual = partial(locate_virtual_markers, topology, repaired, refined.points, refined.scatter)
+        repaired = beside_row_break(rows, repaired)
+        xy, cov, points = without_parallax(
+            refined.appearance.parallax, repaired.xy_px, repaired.cov_px2, refined.points
+        )
+        repaired = stages.record("repair", RepairedMarkers(xy, cov, repaired.status))
+        virtual = partial(locate_virtual_markers, topology, repaired, points, refined.scatter)
         few = is_less_than_half_reported(repaired.xy_px, layout.xy_mm, pad.lattice.present, size)
         view, edges = pyramid.level(1), topology.edges
         quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)
@@ -394,6 +360,65 @@ class Extractor:
         return found.linked >= self._registration.min_cells and found.walk.holes <= max(
             MAX_HOLE_SHARE * found.linked, MIN_HOLES
         )
+
+
+class Extractor:
+    """Finds and numbers the markers of one layout, or of the pads of a family, in images. Can be pickled and copied.
+
+    >>> from extractor import Extractor
+    >>> markers = Extractor("layout.json").extract(image)  # doctest: +SKIP
+    >>> markers = Extractor(["left.json", "right.json"]).extract(image)  # doctest: +SKIP
+    >>> markers.code  # doctest: +SKIP
+
+    Args:
+        layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
+            a layout of cmpdesign. Or a list of these, a family: pads that differ in their codes alone. An image is of
+            one of them, and ``Markers.code`` says of which one.
+        preset: "balanced" or "accurate".
+        response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
+            of the light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
+        side: the side of the pattern that images show: "front", "back", or "designed": the side that the layout's
+            ``mirrored`` states. An image of the other side gives no markers, and a reason. "either": both sides are
+            read.
+        channels: the order of an image's colors: "bgr", as in OpenCV, or "rgb".
+
+    Raises:
+        LayoutError: the layout is not a triangular pattern, its file cannot be read, or layouts are no family.
+        TypeError: ``layout`` is of another type.
+        ValueError: no such preset, response, side or order of channels.
+    """
+
+    def __init__(
+        self,
+        layout: LayoutLike | Sequence[LayoutLike],
+        preset: Preset = "balanced",
+        response: Response | None = None,
+        side: Side = "designed",
+        channels: Channels = "bgr",
+    ) -> None:
+        self._reader = ImageReader(layout, preset, response, side, channels)
+        self.layouts, self.layout = self._reader.layouts, self._reader.layout
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is made from layout and options; buffers are not copied."""
+        return type(self), (self.layouts, *self._reader.options)
+
+    def layout_of(self, markers: Markers) -> Reference:
+        """The layout of the pad that markers are of; of a family without a numbered pad, the first one."""
+        return next((one for one in self.layouts if one.code and one.code.id == markers.code), self.layout)
+
+    def extract(self, image: NDArray[Any]) -> Markers:
+        """The markers in one image, found independently of other frames.
+
+        Args:
+            image: (H, W, 3) uint8, colors in the order of ``channels``; also uint16 of either byte order (scaled to 8
+                bits), with alpha (dropped) and grayscale (without color no marker is found; the reason is
+                ``NO_COLOR``). Need not be contiguous.
+
+        Raises:
+            ImageError: another dtype or shape, or a side below 16 px.
+        """
+        return self._reader.read(image).markers
 
 
 def _recognition_scales(size: tuple[int, int]) -> list[int]:

@@ -85,6 +85,21 @@ class RefinedMarkers:
     scatter: MarkerScatter
 
 
+class UnevenDotGain(NamedTuple):
+    """Changes of the dot gain over the image beyond what noise explains, px/px, 0 or more.
+
+    Attributes:
+        outward: with the distance from the image's middle.
+        across: from one side of the image to the other.
+    """
+
+    outward: float
+    across: float
+
+
+EVEN = UnevenDotGain(0.0, 0.0)
+
+
 class Estimate(NamedTuple):
     """The current estimate. Places are px in the image at the scale of the step. Compiled functions take a part of it.
 
@@ -106,6 +121,7 @@ class Estimate(NamedTuple):
         weight: (E,) 0 to 1, of the gridlines in the last step; 1 before the first.
         reading: gridlines and levels that the last step by synthesis compared with the image; None before the first.
         dot_gain: distance by which the sides of all cells have moved outward, px.
+        uneven_dot_gain: its changes over the image.
         scatter: of the markers, each by itself.
         convergence_cov_px2: (M, 2, 2) covariance of the remaining error after the last step; None before it.
     """
@@ -126,6 +142,7 @@ class Estimate(NamedTuple):
     weight: NDArray[np.float64]
     reading: GridlineReading | None = None
     dot_gain: float = 0.0
+    uneven_dot_gain: UnevenDotGain = EVEN
     scatter: MarkerScatter = NO_SCATTER
     convergence_cov_px2: NDArray[np.float64] | None = None
 

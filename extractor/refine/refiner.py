@@ -42,7 +42,7 @@ from extractor.refine.refinement_step import (
     gridlines_of,
     with_pattern_moved,
 )
-from extractor.refine.relief import find_parallax, without_parallax
+from extractor.refine.relief import Parallax, find_parallax, unknown_parallax
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis_steps import SynthesisSolver
 
@@ -83,19 +83,13 @@ class Refiner:
             before: the appearance of the previous image of a sequence, whose parallax is kept: a contact must not
                 move it, as all displacements would change.
         """
-        refined = self._apparent_markers(pyramid, places, before)
-        found = refined.appearance.parallax
-        if found is None:
+        refined = self._refined(pyramid, places, before)
+        if before is None or before.parallax is None:
             return refined
-        parallax = before.parallax if before is not None and before.parallax is not None else found
-        xy_px, cov_px2, points = without_parallax(parallax, refined.xy_px, refined.cov_px2, refined.points)
-        appearance = refined.appearance._replace(parallax=parallax)
-        return replace(refined, xy_px=xy_px, cov_px2=cov_px2, points=points, appearance=appearance)
+        return replace(refined, appearance=refined.appearance._replace(parallax=before.parallax))
 
-    def _apparent_markers(
-        self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None
-    ) -> RefinedMarkers:
-        """The markers where the picture shows them; see ``__call__``."""
+    def _refined(self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None) -> RefinedMarkers:
+        """The same with the parallax of this image."""
         usual_edge = short_edge(places.xy_px, self._topology.edges, SHORT_RARITY)
         if before is not None and before.scale == self._reduction_scale(
             before.scale * before.sigma, usual_edge
@@ -215,11 +209,12 @@ class Refiner:
         picture = self._synthesis_solver.picture(view.image.shape)
         points = measure_virtual_markers(view, picture, reading, self._virtual)
         xy, cov = native.at_full_scale(xy, cov, places, scale)
-        parallax = None
+        size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
         if self._topology.cell_height != 0.0:
             beside = measure_virtual_markers(view, picture, reading, RELIEF_POINTS)[..., :2]
-            size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
-            parallax = find_parallax(self._topology, xy, beside, size_px)
+            parallax: Parallax | None = find_parallax(self._topology, xy, beside, size_px)
+        else:
+            parallax = unknown_parallax(*estimate.uneven_dot_gain, size_px)
         look = estimate.sigma, estimate.noise, estimate.levels, estimate.pixel_noise
         appearance = Appearance(scale, *look, parallax)
         blur, noise = scale * estimate.sigma, scale * estimate.noise

@@ -12,7 +12,7 @@ from extractor._native import refine as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.topology import Topology
 from extractor.presets import Schedule
-from extractor.refine.estimate import Estimate
+from extractor.refine.estimate import Estimate, UnevenDotGain
 from extractor.refine.measure.gridline_offsets import GridlineReading
 from extractor.refine.measure.marker_scatter import NO_SCATTER
 from extractor.refine.refinement_step import (
@@ -48,6 +48,7 @@ class SynthesisStep(NamedTuple):
         solution: the markers after the step.
         bend_variance: (E,) px^2.
         dot_gain: px.
+        uneven_dot_gain: its changes over the image.
         sigma: px, the blur after the step.
         levels: of the inks at that blur.
         is_read: (E,) bool, the gridlines that were read.
@@ -58,6 +59,7 @@ class SynthesisStep(NamedTuple):
     solution: StepSolution
     bend_variance: NDArray[np.float64]
     dot_gain: float
+    uneven_dot_gain: UnevenDotGain
     sigma: float
     levels: InkLevels
     is_read: NDArray[np.bool_]
@@ -140,5 +142,6 @@ class SynthesisSolver:
             sigma=step.sigma,
             levels=step.levels,
             dot_gain=step.dot_gain,
+            uneven_dot_gain=step.uneven_dot_gain,
         )
         return after, step

@@ -22,6 +22,9 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
   const double blur_px = blur_after_step(sigma, blur_change(sums, state.weight, weights), weights);
   update_for_blur(sums, gradients, blur_px - sigma);
   const double dot_gain = measure_dot_gain(sums, gradients, contrasts, edge_cells, sigma, limits.dot_gain);
+  const UnevenDotGain uneven = measure_uneven_dot_gain(
+      sums, gradients, contrasts, state.xy, topology, static_cast<double>(view.image.size(1)),
+      static_cast<double>(view.image.size(0)), limits.dot_gain);
   Array<double, 1> dot_gain_offset =
       update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
   EliminatedBending bent = update_for_bending(
@@ -51,6 +54,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
           std::move(solved.solution),
           std::move(bent.variance),
           dot_gain,
+          uneven,
           blur_px,
           std::move(after),
           std::move(is_read),

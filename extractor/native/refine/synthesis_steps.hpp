@@ -33,13 +33,15 @@ struct SynthesisStep {
   ReadGridlines reading;
   StepSolution solution;
   Array<double, 1> bend_variance;  // (E,) px^2
-  double dot_gain, sigma;          // px
+  double dot_gain;                 // px
+  UnevenDotGain uneven_dot_gain;
+  double sigma;  // px
   LevelArrays levels;
   Array<bool, 1> is_read;  // (E,)
   double edge_px;
 
   CMP_RECORD("extractor.refine.synthesis_steps.SynthesisStep", reading, solution, bend_variance, dot_gain,
-             sigma, levels, is_read, edge_px)
+             uneven_dot_gain, sigma, levels, is_read, edge_px)
 };
 
 // Draws the pattern into the picture (H, W, 3), compares it with the image, and solves for the markers.

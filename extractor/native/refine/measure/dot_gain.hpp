@@ -7,6 +7,7 @@
 #pragma once
 
 #include "base/array.hpp"
+#include "layout/topology.hpp"
 #include "refine/measure/gridline_weights.hpp"
 
 namespace cmp::refine {
@@ -19,6 +20,9 @@ struct DotGainLimits {
   // in units of the blur; drawings, compression and glare look like less, which is taken as 0. Chosen.
   double min_dot_gain = 0.1;
   double min_sine = 0.2;  // of the angle of a corner; a sharper corner moves no farther. Chosen.
+  // of the deviation of the gridlines' shifts, beyond which a shift counts as this. Chosen.
+  double max_deviations = 3.0;
+  double correlated = 8.0;  // gridlines whose errors are alike; as many count as one. Chosen.
 };
 
 // px, the dot gain: the median shift outward of the sides of cells at the pattern's rim; 0 where the shift is
@@ -29,6 +33,22 @@ struct DotGainLimits {
 double measure_dot_gain(View<const double, 2> sums, const ShiftGradients& gradients,
                         View<const double, 2> contrasts, View<const std::int32_t, 2> edge_cells, double sigma,
                         const DotGainLimits& limits);
+
+// Changes of the dot gain over the image beyond what noise explains, px/px, 0 or more.
+struct UnevenDotGain {
+  double outward = 0.0;  // with the distance from the image's middle
+  double across = 0.0;   // from one side of the image to the other
+
+  CMP_RECORD("extractor.refine.estimate.UnevenDotGain", outward, across)
+};
+
+// The changes of the dot gain, by a cone and a plane through the shifts of gridlines inside the pattern.
+//
+// sums to edge_cells as above; xy (M, 2) px; width and height of the image, px.
+UnevenDotGain measure_uneven_dot_gain(View<const double, 2> sums, const ShiftGradients& gradients,
+                                      View<const double, 2> contrasts, View<const double, 2> xy,
+                                      const layout::Topology& topology, double width, double height,
+                                      const DotGainLimits& limits);
 
 // Removes a dot gain, px, from the gridlines' sums (E, 24) and gradients, in place.
 //
