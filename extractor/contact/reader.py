@@ -227,7 +227,7 @@ class ContactReader:
         """(K,) pressure at the loads. The tractions of neighbouring loads scatter, so it is smoothed."""
         width = SMOOTH_SPACINGS * self.gel.spacing_mm
         loads = self.gel.loads_mm
-        return (self.gel.width_mm / width) ** 2 * _gaussians(loads, loads[support], width) @ peak_mpa
+        return np.asarray((self.gel.width_mm / width) ** 2 * _gaussians(loads, loads[support], width) @ peak_mpa
 
     def _places(self, solution: Solution) -> Array:
         """(S, 3) places of the loads after the displacement by themselves, at the depth of the markers."""

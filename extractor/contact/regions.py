@@ -113,7 +113,7 @@ def _labels(field: Array) -> NDArray[np.intp]:
         joined.append(np.column_stack([one[high], two[high]]))
     for one, two in np.unique(np.concatenate(joined), axis=0):
         goal[goal == goal[one]] = goal[two]
-    return goal.reshape(ny, nx)
+    return np.asarray(goal.reshape(ny, nx))
 
 
 def _counter_clockwise(outline: Array) -> Array:
