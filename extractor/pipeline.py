@@ -34,7 +34,7 @@ from extractor.errors import LayoutError
 from extractor.image.input import Channels, convert_to_bgr
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response, light_of_values, response_tables
-from extractor.layout.lattice_tables import Lattice, lattice_of
+from extractor.layout.lattice_tables import Lattice, cells_between_whites, lattice_of
 from extractor.layout.layout_file import LayoutLike, layouts_of
 from extractor.layout.reference import Reference
 from extractor.layout.topology import Topology, topology_of
@@ -54,9 +54,14 @@ from extractor.result import Markers, Origin, Reason
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
 EQUILATERAL_AREA = math.sqrt(3.0) / 4.0  # over the square of the side
+# The same of coded pads. Derived: regions over the least channel are 6 % smaller than regions in one channel.
+MIN_CODED_LEVEL_EDGE_PX = 6.6
 MAX_HOLE_SHARE = 0.02  # of a lattice that is not looked at more closely; chosen
 MIN_GAIN = 1.1  # in linked cells, of a look that is followed by a closer one; chosen, for time
 MIN_HOLES = 5  # the same as a number: the white cell may hide its three neighbours. Chosen
+MAX_SMALL_HOLE_SHARE = (
+    0.25  # of a lattice with too small cells, that is looked at at a finer scale; chosen, for time
+)
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]
@@ -83,9 +88,9 @@ class FoundCells(NamedTuple):
         areas = self.cells.area_px[self.walk.part >= 0]
         return math.sqrt(select(areas, len(areas) // 2) / EQUILATERAL_AREA) if len(areas) else 0.0
 
-    def is_small(self, view: PyramidLevel) -> bool:
-        """Whether the linked cells are too small for this reduced scale; also without any."""
-        return view.scale > 1 and self.side_px < MIN_LEVEL_EDGE_PX * view.scale
+    def is_small(self, view: PyramidLevel, least_edge_px: float) -> bool:
+        """Whether the linked cells are smaller, at this reduced scale, than the edge; also without any."""
+        return view.scale > 1 and self.side_px < least_edge_px * view.scale
 
 
 class NumberedCells(NamedTuple):
@@ -232,6 +237,8 @@ class ImageReader:
         lattices = [pad.lattice for pad in self._pads]
         self._registration = Registration(lattices, Palette(dict(layout.palette)), self._mirrored)
         self._cells = len(lattices[0].ink)
+        self._least_edge_px = MIN_LEVEL_EDGE_PX if layout.code is None else MIN_CODED_LEVEL_EDGE_PX
+        self._hidden_cells = 0 if layout.code is None else cells_between_whites(lattices[0])
         self._efforts = EFFORTS if layout.code is None else CODED_EFFORTS
         self._pads[0].prepare()
 
@@ -331,9 +338,11 @@ class ImageReader:
             found = self._find_cells(view, before.cells if before else None, effort, stages)
             gains = before is None or found.linked >= MIN_GAIN * before.linked
             before = found
-            if found.is_small(view):
+            if found.is_small(view, self._least_edge_px):
+                if self._is_whole(found, MAX_SMALL_HOLE_SHARE):
+                    break
                 continue
-            if gains and effort is not EFFORTS[-1] and not self._is_whole(found):
+            if gains and effort is not self._efforts[-1] and not self._is_whole(found):
                 skipped.append(found)
             else:
                 yield found
@@ -355,10 +364,10 @@ class ImageReader:
         pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
         return math.sqrt(pixels / (2.0 * self._cells) * 4.0 / math.sqrt(3.0))
 
-    def _is_whole(self, found: FoundCells) -> bool:
-        """Whether the cells of an image are all found, as far as the cells themselves show it."""
+    def _is_whole(self, found: FoundCells, hole_share: float = MAX_HOLE_SHARE) -> bool:
+        """Whether the cells of an image are all found but a share, as far as the cells themselves show it."""
         return found.linked >= self._registration.min_cells and found.walk.holes <= max(
-            MAX_HOLE_SHARE * found.linked, MIN_HOLES
+            hole_share * found.linked + self._hidden_cells, MIN_HOLES
         )
 
 
