@@ -227,14 +227,17 @@ class ContactReader:
         """(K,) pressure at the loads. The tractions of neighbouring loads scatter, so it is smoothed."""
         width = SMOOTH_SPACINGS * self.gel.spacing_mm
         loads = self.gel.loads_mm
-        return np.asarray((self.gel.width_mm / width) ** 2 * _gaussians(loads, loads[support], width) @ peak_mpa
+        return np.asarray(
+            (self.gel.width_mm / width) ** 2 * _gaussians(loads, loads[support], width) @ peak_mpa
+        )
 
     def _places(self, solution: Solution) -> Array:
         """(S, 3) places of the loads after the displacement by themselves, at the depth of the markers."""
         loads, columns = self.gel.loads_mm[solution.support], solution.support[:, None] * 3 + np.arange(3)
         moved = (self.gel.matrix[:, columns.ravel()] @ solution.traction.ravel()).reshape(-1, 3)
         weight = _gaussians(loads, self.layout.xy_mm, self.gel.spacing_mm)
-        return np.pad(loads, [(0, 0), (0, 1)]) + weight @ moved / weight.sum(axis=1, keepdims=True)
+        mean = weight @ moved / weight.sum(axis=1, keepdims=True)
+        return np.asarray(np.pad(loads, [(0, 0), (0, 1)]) + mean)
 
     def _summed(self, members: NDArray[np.intp], loads: _Loads, noise: Array) -> _Sum:
         area = self.gel.area_mm2[loads.support[members]]
