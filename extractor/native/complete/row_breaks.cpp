@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -17,10 +18,12 @@ constexpr std::uint8_t MEASURED = 1;  // Status in extractor/result.py
 
 using Vector = std::array<double, 2>;
 
-// Four markers in a row: the edge in the middle, its middle and vector, and the jump there, px.
+// Four markers in a row: the edge in the middle, its middle and vector, the jump there, px, and the stated
+// variance of the jump, px^2, both axes.
 struct Gridline {
   Index edge;
   Vector middle, rise, jump;
+  double variance;
 };
 
 using Values = std::span<double>;
@@ -31,29 +34,23 @@ double median(Values values) {
 
 double length(double x, double y) { return std::sqrt(x * x + y * y); }
 
-// The gridlines of four markers that are measured with certainty, and the lengths of all measured edges; a
+// The gridlines of four measured markers, and the lengths of all measured edges; a
 // jump is a third of the third difference.
 std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::Topology& topology,
                                    const JumpLimits& limits, std::vector<double>& lengths) {
   const auto is_measured = [&](Index m) { return m >= 0 && markers.status[m] == MEASURED; };
-  const auto is_certain = [&](Index m, double most) {
-    return is_measured(m) && markers.cov_px2(m, 0, 0) + markers.cov_px2(m, 1, 1) < 2.0 * most * most;
-  };
   std::vector<Gridline> found;
   double uu = 0, uv = 0, vv = 0;
   Vector by_u{}, by_v{};
   for (Index e = 0; e < topology.edges.size(); ++e) {
     const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
     if (!is_measured(a) || !is_measured(b)) continue;
-    Gridline line{e, {}, {}, {}};
+    Gridline line{e, {}, {}, {}, 0.0};
     for (int k = 0; k < 2; ++k) line.rise[k] = markers.xy_px(b, k) - markers.xy_px(a, k);
-    const double edge_px = length(line.rise[0], line.rise[1]), most = limits.max_deviation * edge_px;
-    lengths.push_back(edge_px);
+    lengths.push_back(length(line.rise[0], line.rise[1]));
     const Index before = topology.next_markers(e, 0), after = topology.next_markers(e, 1);
     const double own = length(topology.third_differences(e, 0), topology.third_differences(e, 1));
-    if (own >= 3 * limits.most_of_layout) continue;
-    if (!is_certain(before, most) || !is_certain(a, most) || !is_certain(b, most) || !is_certain(after, most))
-      continue;
+    if (own >= 3 * limits.most_of_layout || !is_measured(before) || !is_measured(after)) continue;
     const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
     uu += u * u, uv += u * v, vv += v * v;
     for (int k = 0; k < 2; ++k) {
@@ -61,6 +58,8 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
       line.jump[k] = line.rise[k] - (markers.xy_px(after, k) - markers.xy_px(before, k)) / 3;
       by_u[k] += u * line.rise[k], by_v[k] += v * line.rise[k];
     }
+    const auto variance = [&](Index m) { return markers.cov_px2(m, 0, 0) + markers.cov_px2(m, 1, 1); };
+    line.variance = variance(a) + variance(b) + (variance(before) + variance(after)) / 9;
     found.push_back(line);
   }
   // Round and elliptical layouts have third differences themselves. These are mapped to the image, and taken
@@ -76,12 +75,14 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
   return found;
 }
 
-// The length of the median jump of each strip along an axis, the later row or column less the earlier one.
+// The length of the median jump of each strip along an axis, the later row or column less the earlier one,
+// beyond the errors of its markers.
 Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, double edge,
                              const JumpLimits& limits) {
   struct Crossing {
     std::size_t strip;
     Vector jump;
+    double variance;
   };
   std::vector<Crossing> crossings;
   std::vector<std::size_t> end;  // of each strip's crossings, sorted by strips
@@ -92,21 +93,25 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
     if (strip >= end.size()) end.resize(strip + 1);
     ++end[strip];
     const auto jump = [&](int k) { return std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge); };
-    crossings.push_back({strip, {jump(0), jump(1)}});
+    crossings.push_back({strip, {jump(0), jump(1)}, line.variance});
   }
   std::partial_sum(end.begin(), end.end(), end.begin());
   std::vector<std::size_t> next(end);
-  std::vector<double> x(crossings.size()), y(crossings.size());
+  std::vector<double> x(crossings.size()), y(crossings.size()), variance(crossings.size());
   for (const Crossing& one : crossings) {
     const std::size_t at = --next[one.strip];
-    x[at] = one.jump[0], y[at] = one.jump[1];
+    x[at] = one.jump[0], y[at] = one.jump[1], variance[at] = one.variance;
   }
-  Array<double, 1> jump({static_cast<Index>(end.size())}, 0.0);
+  Array<double, 1> jump({static_cast<Index>(end.size())}, std::numeric_limits<double>::quiet_NaN());
   for (std::size_t s = 0; s < end.size(); ++s) {
     const std::size_t count = end[s] - next[s];
-    if (static_cast<Index>(count) >= limits.min_gridlines)
-      jump[static_cast<Index>(s)] =
-          length(median(Values(x).subspan(next[s], count)), median(Values(y).subspan(next[s], count)));
+    if (static_cast<Index>(count) < limits.min_gridlines) continue;
+    const auto median_of = [&](std::vector<double>& values) {
+      return median(Values(values).subspan(next[s], count));
+    };
+    const double dx = median_of(x), dy = median_of(y);
+    const double beyond = dx * dx + dy * dy - limits.common_error * median_of(variance);
+    jump[static_cast<Index>(s)] = std::sqrt(std::max(beyond, 0.0));
   }
   return jump;
 }
