@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from cmpdesign.api.calibration import calibrate_camera as calibrate_camera
+    from cmpdesign.api.calibration import calibrate_check as calibrate_check
     from cmpdesign.api.calibration import calibrate_rig as calibrate_rig
     from cmpdesign.api.datasets import dataset as dataset
     from cmpdesign.api.datasets import extract as extract
@@ -116,6 +117,7 @@ _HOMES = {
     "build": "cmpdesign.api.designs",
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
+    "calibrate_check": "cmpdesign.api.calibration",
     "calibrate_force": "cmpdesign.api.force",
     "calibrate_gel": "cmpdesign.api.force",
     "calibrate_pattern": "cmpdesign.api.workshop",

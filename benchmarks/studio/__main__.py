@@ -1,6 +1,10 @@
-"""The studio's page: time to its first answer, from a changed field to the drawing, bytes of its own files.
+"""The studio's page: time to its first answer, from a changed field to the drawing, bytes of its files, frames shown.
 
-The times are those of requests to a running ``cmpdesign studio`` on this machine.
+The times are those of requests to a running ``cmpdesign studio`` on this machine. With an installed Chromium, frames of
+640 x 480 px and 331 markers are shown by the part Touch: of a file that stands for the browser's camera, and of
+``view`` over a video with one view, and with two views, whose surface and force are shown. "frames/s" is the source's
+rate; "read/s" the rate at which the reader gives results; "shown/s" counts the frames whose number stands on the page
+at an animation frame of the browser; "longest gap" is the time between two of these.
 """
 
 from __future__ import annotations
@@ -9,8 +13,6 @@ import gzip
 import http.client
 import json
 import resource
-import subprocess
-import sys
 import time
 from urllib.parse import urlsplit
 
@@ -18,36 +20,35 @@ import numpy as np
 
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.studio.page import chromium, served
+from benchmarks.studio.shown import SHOWN, shown_rows
 from cmpdesign.studio.app import PAGE
 
-LAYERS, CHANGES = 20, 200
+LAYERS, CHANGES, SECONDS, QUICK_SECONDS = 20, 200, 10.0, 3.0
 
 
-def measure() -> Shown:
-    """One row a figure."""
+def measure(quick: bool = False) -> Shown:
+    """One row a figure, then the frames that are shown.
+
+    Args:
+        quick: frames are shown for few seconds.
+    """
     began_s = time.perf_counter()
-    command = [sys.executable, "-m", "cmpdesign", "studio", "--port", "0", "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    with process.stdout as printed:
-        try:
-            address = urlsplit(printed.readline().strip())
+    with served() as printed:
+        address = urlsplit(printed)
+        connection = http.client.HTTPConnection(str(address.hostname), address.port)
+        connection.request("GET", f"/?{address.query}")
+        cookie = str(connection.getresponse().getheader("set-cookie")).partition(";")[0]
+        first_s = time.perf_counter() - began_s
+        times_ms = []
+        for change in range(CHANGES):
+            fields = {"pattern": "honeycomb", "layers": LAYERS, "pitch_mm": 1 + change / CHANGES}
+            start_s = time.perf_counter()
             connection = http.client.HTTPConnection(str(address.hostname), address.port)
-            connection.request("GET", f"/?{address.query}")
-            cookie = str(connection.getresponse().getheader("set-cookie")).partition(";")[0]
-            first_s = time.perf_counter() - began_s
-            times_ms = []
-            for change in range(CHANGES):
-                fields = {"pattern": "honeycomb", "layers": LAYERS, "pitch_mm": 1 + change / CHANGES}
-                start_s = time.perf_counter()
-                connection = http.client.HTTPConnection(str(address.hostname), address.port)
-                connection.request("POST", "/api/design", json.dumps({"fields": fields}), {"cookie": cookie})
-                answer = connection.getresponse()
-                assert answer.status == 200 and json.loads(answer.read())["svg"]
-                times_ms.append(1e3 * (time.perf_counter() - start_s))
-        finally:
-            process.terminate()
-            process.wait(20)
+            connection.request("POST", "/api/design", json.dumps({"fields": fields}), {"cookie": cookie})
+            answer = connection.getresponse()
+            assert answer.status == 200 and json.loads(answer.read())["svg"]
+            times_ms.append(1e3 * (time.perf_counter() - start_s))
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     size = sum(len(gzip.compress(path.read_bytes())) for path in PAGE.iterdir())
     p50, p95 = np.percentile(times_ms, [50, 95])
@@ -60,6 +61,10 @@ def measure() -> Shown:
         ("the page's own files, compressed, kB", size / 1e3),
     ]
     yield Table("studio", {"figure": TEXT, "value": ".2f"}, rows)
+    if chromium() is None:
+        yield "no Chromium is installed: frames on the page are not counted"
+        return
+    yield Table("frames on the page", SHOWN, list(shown_rows(QUICK_SECONDS if quick else SECONDS)))
 
 
 main = Experiment("studio", measure)

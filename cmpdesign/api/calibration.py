@@ -1,4 +1,4 @@
-"""Calibrations of one sensor: ``calibrate camera`` and ``calibrate rig`` of the command line."""
+"""Calibrations of one sensor: ``calibrate camera``, ``calibrate rig`` and ``calibrate check`` of the command line."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
     from cmpdesign.calibration.camera import CameraCalibration
     from cmpdesign.calibration.rig.calibration import RigCalibration
+    from cmpdesign.calibration.rig.check import SensorCheck
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.sensor.sensor_file import SensorFile
-    from extractor import LayoutLike, Markers, Reference, Side
+    from extractor import LayoutLike, Markers, Reference, Rig, Side
     from extractor.presets import Preset
 
 Response = Literal["srgb", "linear"] | float
@@ -146,7 +147,7 @@ def calibrate_rig(
     given = [rest] if isinstance(rest, str | Path) else list(rest)
     ways = dict(steps or {})
     names = [*map(str, given), *map(str, ways.values())]
-    found = _read_views(sensor, reference, names, side, max_pixels)
+    found = _read_views(sensor, reference, sensor.rig.without_poses(), names, side, max_pixels)
     camera = sensor.table.calibration.camera
     calibration = calibrate_rig_markers(
         reference,
@@ -166,6 +167,52 @@ def calibrate_rig(
     return calibration
 
 
+def calibrate_check(
+    sensor: str | Path,
+    images: str | Path | Sequence[str | Path],
+    *,
+    layout: LayoutLike | AnyLayout | None = None,
+    max_pixels: int = MOST_PIXELS,
+) -> SensorCheck:
+    """Compare pictures of a sensor's pad at rest with its calibration, as the command ``calibrate check`` does.
+
+    >>> found = cmpdesign.calibrate_check("sensor.toml", ["today.png"])
+    >>> found.holds, found.misfit, found.likely, found.steps
+
+    Args:
+        sensor: the sensor file that ``calibrate rig`` wrote.
+        images: pictures of the pad at rest; of several cameras one for each view, joined by commas.
+        layout: the pad's layout; None: the one that the file names.
+        max_pixels: largest image that is read, width x height.
+
+    Raises:
+        CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures that show no pattern.
+    """
+    from cmpdesign.calibration.rig.check import check_markers
+    from cmpdesign.sensor.sensor_file import load_sensor_file
+
+    file = load_sensor_file(sensor)
+    unplaced = [view.name for view in file.rig.views if not view.placed]
+    if unplaced:
+        raise CmpDesignError(
+            f"{sensor}: view {unplaced[0]!r} has no pose, so that there is nothing to compare; first: cmpdesign "
+            "calibrate rig"
+        )
+    reference = reference_from(file.layout if layout is None else layout)
+    names = [str(images)] if isinstance(images, str | Path) else [str(one) for one in images]
+    found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
+    before = file.table.calibration.rig
+    stated = before.rms_px if before is not None and len(before.rms_px) == len(file.rig.views) else ()
+    return check_markers(
+        reference,
+        file.rig,
+        found,
+        stated_px=dict(zip(file.rig.names, stated, strict=False)),
+        scale=before.scale if before is not None else 1.0,
+        limit_px=file.table.limits.max_rest_error_px,
+    )
+
+
 def _require_beside(rig: Path, output: Path) -> None:
     if output.suffix.lower() != ".toml":
         raise CmpDesignError(f"{output}: unknown ending of a sensor file; expected .toml")
@@ -180,9 +227,9 @@ def _require_beside(rig: Path, output: Path) -> None:
 
 
 def _read_views(
-    sensor: SensorFile, reference: Reference, names: Sequence[str], side: Side, max_pixels: int
+    sensor: SensorFile, reference: Reference, rig: Rig, names: Sequence[str], side: Side, max_pixels: int
 ) -> list[tuple[Markers, ...]]:
-    """The markers of all pictures, view by view.
+    """The markers of all pictures, view by view; ``rig`` is the sensor's, with or without poses.
 
     Raises:
         CmpDesignError: a picture in which a view shows no pattern.
@@ -191,9 +238,7 @@ def _read_views(
     from extractor import ViewExtractor
     from extractor.result import SIDE_REASONS
 
-    views = ViewExtractor(
-        reference, sensor.rig.without_poses(), "accurate", cast("Any", sensor.table.response), side
-    )
+    views = ViewExtractor(reference, rig, "accurate", cast("Any", sensor.table.response), side)
     out = []
     for number, name in enumerate(names):
         pictures = [read_image(Path(part), max_pixels) for part in name.split(",")]

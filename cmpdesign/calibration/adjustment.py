@@ -3,7 +3,8 @@
 The unknowns are the camera's parameters and the sheet's shape, common to all pictures, and one pose a picture. The
 poses are eliminated picture by picture (Schur's complement), so that the system to solve has the size of the common
 part. Every picture has its own scale of errors, estimated from its residuals, so that a picture that contradicts weighs
-little; points beyond ``HUBER`` deviations weigh less (Huber 1964).
+little; points beyond ``HUBER`` deviations weigh less (Huber 1964). The covariance follows from how well the pictures
+agree (``agreement``).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cmpdesign.calibration.agreement import Agreement, agreement
 from cmpdesign.calibration.models import CameraModel, parameters
 from cmpdesign.calibration.sightings import Sheet, Sighting
 from extractor import View
@@ -70,6 +72,11 @@ class Problem:
     def counts(self) -> Array:
         """(V,) numbers of each picture, two a point."""
         return np.array([2.0 * len(one.ids) for one in self.sightings])
+
+    @property
+    def freedom(self) -> Array:
+        """(V,) numbers of each picture less its pose's 6."""
+        return np.asarray(np.maximum(self.counts - 6, 1.0))
 
     @cached_property
     def points(self) -> _Points:
@@ -141,6 +148,7 @@ class Adjusted:
         gradients: (V, G) each picture's part of the gradient.
         chi2: (V,) weighted squares, in these scales.
         prior: (G,) information of the usual values.
+        agreement: of each picture with all others, in these scales.
     """
 
     problem: Problem
@@ -152,6 +160,7 @@ class Adjusted:
     gradients: Array
     chi2: Array
     prior: Array
+    agreement: Agreement
 
     @property
     def camera(self) -> View:
@@ -163,11 +172,6 @@ class Adjusted:
         """(4 + K, 4 + K) covariance of the camera's parameters."""
         count = 4 + self.problem.model.coefficients
         return self.cov[:count, :count]
-
-    @property
-    def freedom(self) -> Array:
-        """(V,) numbers of each picture less its pose's 6."""
-        return np.asarray(np.maximum(self.problem.counts - 6, 1.0))
 
 
 def adjust(problem: Problem, start: Guess) -> Adjusted:
@@ -256,11 +260,21 @@ def _moved(problem: Problem, guess: Guess, common: Array, poses: Array) -> Guess
     if not np.isfinite(changed).all() or changed[:2].min() <= 0.05 * values[:2].min():
         return None
     camera = problem.model.view(changed)
-    views = [
-        camera.at(view.R_camera_from_layout, view.t_camera_from_layout_mm).turned(step)
-        for view, step in zip(guess.views, poses, strict=True)
-    ]
+    turns = _rotations(poses[:, :3]) @ np.stack([view.R_camera_from_layout for view in guess.views])
+    left, _, right = np.linalg.svd(turns)
+    shifts = np.stack([view.t_camera_from_layout_mm for view in guess.views]) + poses[:, 3:]
+    views = [camera.at(turn, shift) for turn, shift in zip(left @ right, shifts, strict=True)]
     return Guess(tuple(views), guess.shape + common[len(values) :])
+
+
+def _rotations(turns: Array) -> Array:
+    """(V, 3, 3) of turns (V, 3) in rad, by Rodrigues' formula."""
+    angle = np.linalg.norm(turns, axis=1)[:, None, None]
+    cross = cross_matrix(turns)
+    small = np.maximum(angle, 1e-12)
+    return np.asarray(
+        np.eye(3) + np.sin(angle) / small * cross + (1 - np.cos(angle)) / small**2 * cross @ cross
+    )
 
 
 class _Seen(NamedTuple):
@@ -330,7 +344,7 @@ def linearise(problem: Problem, guess: Guess, scales: Array) -> Blocks:
 
 def _scales(problem: Problem, residual: Array, scales: Array) -> tuple[Array, float]:
     """(V,) the pictures' scales by their residuals, none below a usual picture's, and that one."""
-    freedom = np.maximum(problem.counts - 6, 1.0)
+    freedom = problem.freedom
     found = np.sqrt((residual**2).sum(axis=(1, 2)) / freedom)
     for _ in range(10):  # to the scales at which Huber's cost is as expected
         found = found * np.sqrt(np.maximum(_squares(residual / found[:, None, None]) / freedom, 0.01))
@@ -344,7 +358,13 @@ def _finish(problem: Problem, guess: Guess, scales: Array, base: float, prior: _
     reduced = blocks.common - carried @ np.swapaxes(blocks.mixed, 1, 2)
     gradients = blocks.right - (carried @ blocks.right_pose[:, :, None])[:, :, 0]
     chi2 = _squares(residuals(problem, guess) / scales[:, None, None])
-    information = reduced.sum(axis=0) + np.diag(prior.information)
-    root = np.sqrt(information.diagonal())
-    cov = np.linalg.inv(information / root / root[:, None]) / root / root[:, None]
-    return Adjusted(problem, guess, cov, scales, base, reduced, gradients, chi2, prior.information)
+    agreed = agreement(reduced, gradients, chi2, problem.freedom, prior.information)
+    cov = covariance(reduced.sum(axis=0), prior.information, agreed.difference)
+    return Adjusted(problem, guess, cov, scales, base, reduced, gradients, chi2, prior.information, agreed)
+
+
+def covariance(information: Array, prior: Array, difference: Array) -> Array:
+    """(G, G) covariance of the common unknowns from the pictures' information (G, G), by their differences (V,)."""
+    total = information / np.mean(difference**2) + np.diag(prior)
+    root = np.sqrt(total.diagonal())
+    return np.asarray(np.linalg.inv(total / root / root[:, None]) / root / root[:, None])

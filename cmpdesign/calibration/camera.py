@@ -133,8 +133,8 @@ def calibrate_points(
                 "take the pictures again"
             )
         kept = replace(problem, sightings=tuple(sightings[int(i)] for i in used))
-        views = tuple(whole.guess.views[int(i)] for i in used)
-        adjusted = choose_model(kept, Guess(views, whole.guess.shape[:0]), [whole.problem.model])
+        views = tuple(view for view, out in zip(adjusted.guess.views, bad, strict=True) if not out)
+        adjusted = choose_model(kept, Guess(views, adjusted.guess.shape), models)
     advice = best_further_view(adjusted)
     _require_focal_length(adjusted, advice)
     ray_px = ray_rms_px(adjusted.camera, adjusted.lens_cov, size_px)

@@ -31,12 +31,12 @@ def left_out_scales(adjusted: Adjusted) -> Array:
     for part, gradient, chi2 in zip(adjusted.reduced, adjusted.gradients, adjusted.chi2, strict=True):
         step = np.linalg.solve(total - part, gradient)
         squares.append(chi2 + 2 * gradient @ step + step @ part @ step)
-    return np.asarray(np.sqrt(np.array(squares) / adjusted.freedom) * adjusted.scales)
+    return np.asarray(np.sqrt(np.array(squares) / adjusted.problem.freedom) * adjusted.scales)
 
 
 def _unlikelihood(adjusted: Adjusted) -> Array:
     """(V,) minus twice the log-likelihood of each picture left out."""
-    return np.asarray(2 * adjusted.freedom * np.log(left_out_scales(adjusted)))
+    return np.asarray(2 * adjusted.problem.freedom * np.log(left_out_scales(adjusted)))
 
 
 def best_of(candidates: Sequence[Adjusted]) -> Adjusted:
@@ -51,17 +51,24 @@ def best_of(candidates: Sequence[Adjusted]) -> Adjusted:
 
 
 def choose_model(problem: Problem, start: Guess, models: Sequence[CameraModel] = MODELS) -> Adjusted:
-    """The likeliest model of the lens, and a flat or a bent sheet; the fields of ``problem`` for these are ignored."""
-    flat = best_of(_fitted(problem, start, models, bent=False))
-    (bent,) = _fitted(problem, flat.guess, [flat.problem.model], bent=True)
-    if best_of([flat, bent]) is flat:
-        return flat
-    return best_of(_fitted(problem, bent.guess, models, bent=True))
+    """The likeliest model of the lens, and a flat or a bent sheet; the fields of ``problem`` for these are ignored.
+
+    The sheet is first taken to be as in ``start``: bent where that has a shape.
+    """
+    was_bent = len(start.shape) > 0
+    likely = best_of(_fitted(problem, start, models, bent=was_bent))
+    (other,) = _fitted(problem, likely.guess, [likely.problem.model], bent=not was_bent)
+    flat, bent = (other, likely) if was_bent else (likely, other)
+    if best_of([flat, bent]) is likely:
+        return likely
+    return best_of(_fitted(problem, other.guess, models, bent=not was_bent))
 
 
 def _fitted(problem: Problem, start: Guess, models: Sequence[CameraModel], *, bent: bool) -> list[Adjusted]:
     """Every model adjusted, each from the one before."""
     out = []
+    if not bent:
+        start = Guess(start.views, start.shape[:0])
     for model in models:
         one = Problem(problem.sheet, problem.sightings, model, bent, problem.size_px)
         out.append(adjust(one, with_model(start, model, problem.size_px)))

@@ -10,15 +10,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cmpdesign.calibration.adjustment import Adjusted, Guess, Problem, linearise, residuals
-from cmpdesign.calibration.choice import left_out_scales
+from cmpdesign.calibration.adjustment import Adjusted, Guess, Problem, covariance, linearise, residuals
 from cmpdesign.calibration.rays import pixel_grid, ray_covariances
 from cmpdesign.calibration.sightings import Sighting
 from extractor import View
 
 Array = NDArray[np.float64]
 
-CONTRADICTS = 3.0  # scale of a picture left out, over a usual picture's; chosen
+CONTRADICTS = 3.0  # difference of a picture from all others over its scatter, over a usual picture's; chosen
 EXPLAINED = 0.5  # share of a picture's squares that its cause leaves at most; chosen
 ANOTHER_LENS = "another focal length or focus than in the other pictures"
 BENT = "the sheet is bent otherwise than in the other pictures"
@@ -46,8 +45,8 @@ class Advice(NamedTuple):
 
 
 def contradicting(adjusted: Adjusted) -> NDArray[np.bool_]:
-    """(V,) bool, the pictures whose points lie much farther from their places than those of the others."""
-    return np.asarray(left_out_scales(adjusted) > CONTRADICTS * adjusted.base)
+    """(V,) bool, the pictures that disagree with all others much more than usual."""
+    return np.asarray(adjusted.agreement.contradiction > CONTRADICTS)
 
 
 def likely_cause(adjusted: Adjusted, number: int) -> str:
@@ -64,19 +63,22 @@ def likely_cause(adjusted: Adjusted, number: int) -> str:
     normal = np.block([[blocks.common[0], blocks.mixed[0]], [blocks.mixed[0].T, blocks.pose[0]]])
     right = np.concatenate([blocks.right[0], blocks.right_pose[0]])
     squares = float((residuals(one, guess) ** 2).sum()) / scale[0] ** 2
-    pose = list(range(len(right) - 6, len(right)))
+    focal = np.zeros((len(right), 1))
+    focal[:2, 0] = view.focal_px
+    unit = np.eye(len(right))
     left = {
-        cause: squares - _explained(normal, right, [*columns, *pose])
-        for cause, columns in ((ANOTHER_LENS, range(4)), (BENT, range(lens + 4, len(right) - 6, 3)))
+        cause: squares - _explained(normal, right, np.hstack([columns, unit[:, -6:]]))
+        for cause, columns in ((ANOTHER_LENS, focal), (BENT, unit[:, lens + 4 : len(right) - 6 : 3]))
     }
     if left[ANOTHER_LENS] < EXPLAINED * squares and left[ANOTHER_LENS] < 2 * left[BENT]:
         return ANOTHER_LENS
     return BENT if left[BENT] < EXPLAINED * squares else MOVED
 
 
-def _explained(normal: Array, right: Array, columns: list[int]) -> float:
-    part = normal[np.ix_(columns, columns)]
-    return float(right[columns] @ np.linalg.lstsq(part, right[columns], rcond=1e-12)[0])
+def _explained(normal: Array, right: Array, columns: Array) -> float:
+    """The squares that steps along columns (G + 6, K) explain."""
+    part, wanted = columns.T @ normal @ columns, columns.T @ right
+    return float(wanted @ np.linalg.lstsq(part, wanted, rcond=1e-12)[0])
 
 
 def ray_rms_px(camera: View, cov: Array, size_px: tuple[int, int]) -> float:
@@ -87,12 +89,12 @@ def ray_rms_px(camera: View, cov: Array, size_px: tuple[int, int]) -> float:
 
 def best_further_view(adjusted: Adjusted) -> Advice:
     """The view, of tilted ones in the middle and in the corners, after which the rays are known best."""
-    information = adjusted.reduced.sum(axis=0) + np.diag(adjusted.prior)
+    information = adjusted.reduced.sum(axis=0)
     lens = len(adjusted.lens_cov)
     found = []
     for text, view in _tilted_views(adjusted):
-        gained = _information(adjusted, view)
-        cov = np.linalg.inv(information + gained)[:lens, :lens]
+        known = information + _information(adjusted, view)
+        cov = covariance(known, adjusted.prior, adjusted.agreement.difference)[:lens, :lens]
         found.append(Advice(text, ray_rms_px(adjusted.camera, cov, adjusted.problem.size_px)))
     return min(found, key=lambda advice: advice.ray_px)
 

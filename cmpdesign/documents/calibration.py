@@ -76,3 +76,30 @@ class CalibrateRigDocument(Document):
     scale: float = Field(description="Residuals over their stated deviations; 1 is right.")
     depth_share: float = Field(description="Standard deviation of the depth of a press, over the press.")
     mirrors: tuple[MirrorsPart, ...]
+
+
+class CausePart(DocumentPart):
+    """One possible cause of larger residuals."""
+
+    cause: str
+    left: float = Field(description="Residuals that the cause leaves, over those of the calibration.")
+    changes: dict[str, float] = Field(description="What has changed, in the names' units.")
+    likely: bool
+
+
+class CalibrateCheckDocument(Document):
+    """The result of ``calibrate check``."""
+
+    format: Literal["cmp-calibration-check"] = "cmp-calibration-check"
+    version: Literal[1] = 1
+    holds: bool = Field(description="Whether the calibration still is true; else the exit code is 1.")
+    misfit: float = Field(description="Residuals at rest over those of the calibration; 1 is right.")
+    picture_misfits: dict[str, float] = Field(description="The same of each picture alone.")
+    rms_px: dict[str, float] = Field(description="RMS residual per axis, of each view.")
+    stated_px: dict[str, float] = Field(description="The same at the calibration; empty where unknown.")
+    limit_px: float | None = Field(description="[limits] max_rest_error_px; null: by the misfit.")
+    causes: tuple[CausePart, ...] = Field(description="The likeliest first.")
+    steps: tuple[str, ...] = Field(description="What to do; empty where the calibration holds.")
+    depth_error: float | None = Field(
+        description="Relative error of depths by the likeliest cause; null where unknown."
+    )

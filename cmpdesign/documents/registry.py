@@ -33,6 +33,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
     "extract": (data.DatasetDocument,),
     "kerf": (reading.KerfDocument, reading.GridDocument),
     "calibrate camera": (calibration.CalibrateCameraDocument,),
+    "calibrate check": (calibration.CalibrateCheckDocument,),
     "calibrate force": (reading.CalibrateForceDocument,),
     "calibrate gel": (reading.CalibrateGelDocument,),
     "calibrate pattern": (reading.CalibratePatternDocument,),

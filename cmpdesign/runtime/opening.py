@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from cmpdesign.runtime.pairing import nearest_places
 from cmpdesign.runtime.plan import plan_of
@@ -14,6 +14,9 @@ from cmpdesign.runtime.result import SensorFrame, SensorFrames
 from cmpdesign.runtime.sensor import LateError, Sensor
 from cmpdesign.sensor.sensor_file import load_sensor_file
 from cmpdesign.sensor.tables import SensorError
+
+if TYPE_CHECKING:
+    from cmpdesign.runtime.publish.recording import SensorRecording
 
 
 class Sensors:
@@ -25,6 +28,7 @@ class Sensors:
 
     def __init__(self, sensors: Iterable[Sensor]) -> None:
         self._sensors = {sensor.name: sensor for sensor in sensors}
+        self._recordings: list[SensorRecording] = []
 
     def __getattr__(self, name: str) -> Sensor:
         return self[name] if not name.startswith("_") else super().__getattribute__(name)
@@ -72,10 +76,27 @@ class Sensors:
         for sensor in self:
             sensor.zero(check)
 
+    def record(self, path: str | Path) -> SensorRecording:
+        """Record all results from now on into one MCAP file, until the recording or the sensors are closed.
+
+        Raises:
+            CmpDesignError, OutputError: see ``SensorRecording``.
+        """
+        from cmpdesign.runtime.publish.recording import SensorRecording
+
+        self._recordings.append(SensorRecording(self, Path(path)))
+        return self._recordings[-1]
+
     def close(self) -> None:
-        """End all threads."""
+        """End all threads, and complete recordings.
+
+        Raises:
+            OutputError: a recording could not be written.
+        """
         for sensor in self:
             sensor.close()
+        while self._recordings:
+            self._recordings.pop().close()
 
     def _paired(self) -> SensorFrames:
         histories = [sensor.results for sensor in self]

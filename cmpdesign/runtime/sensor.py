@@ -11,7 +11,7 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.runtime.camera import Camera, CameraFrame
 from cmpdesign.runtime.events import Event as SensorEvent
 from cmpdesign.runtime.events import EventLog
-from cmpdesign.runtime.health import FRAMES, Health, Timing, health_of
+from cmpdesign.runtime.health import FRAMES, AtRest, Health, Past, health_of, past_of
 from cmpdesign.runtime.pairing import newest_set
 from cmpdesign.runtime.plan import SensorPlan
 from cmpdesign.runtime.result import SensorFrame
@@ -19,7 +19,7 @@ from cmpdesign.runtime.zero import FRAMES as ZERO_FRAMES
 from cmpdesign.runtime.zero import rest_markers
 
 if TYPE_CHECKING:
-    from extractor import ContactTracker, Markers, ShapeTracker, Tracker
+    from extractor import ContactTracker, ShapeTracker, Tracker
 
 KEPT_RESULTS = 16  # of which those of several sensors are paired; chosen, as each holds its image
 LONGEST_WAIT_S = 0.25  # of the reading thread, before it looks for the end
@@ -51,9 +51,9 @@ class Sensor:
         self.name, self.plan, self.count = plan.name, plan, 0
         self._log, self._changed = EventLog(), Condition()
         self._results: deque[SensorFrame] = deque(maxlen=KEPT_RESULTS)
-        self._timings: deque[Timing] = deque(maxlen=FRAMES)
+        self._past: deque[Past] = deque(maxlen=FRAMES)
         self.tracker: Tracker | ContactTracker | ShapeTracker | None = None
-        self._rest: tuple[Markers, ...] | None = None
+        self._rest: AtRest | None = None
         self._closing, self._failure = Event(), ""
         table, self._cameras = plan.file.table, list[Camera]()
         try:
@@ -89,10 +89,10 @@ class Sensor:
         """
         if not self._results:
             raise LateError(self._late_text("there is no result"))
-        markers, limits = int(self.plan.layout.present.sum()), self.plan.file.table.limits
-        return health_of(
-            self._results[-1], tuple(self._timings), self._rest, markers, limits, self._log.count
-        )
+        with self._changed:
+            newest, past = self._results[-1], tuple(self._past)
+        limits = self.plan.file.table.limits
+        return health_of(newest, past, self._rest, self.plan.layout, limits, self._log.count)
 
     def latest(self) -> SensorFrame:
         """The newest result. The first one is waited for.
@@ -130,6 +130,9 @@ class Sensor:
     def zero(self, check: bool = True) -> None:
         """Take the mean of the next frames as the rest frame, from which displacement, shape and force count.
 
+        Light and focus of these frames are those that ``health`` expects from now on, and markers that they do not
+        show, as behind a scratch, are not expected any more.
+
         Args:
             check: refuse a pattern that is bent against the former rest frame; False: after the start under load.
 
@@ -140,10 +143,13 @@ class Sensor:
         frames = [self.wait()]
         while len(frames) < ZERO_FRAMES:
             frames.append(self.wait(frames[-1].index, ZERO_WAIT_S))
-        before = self._rest if check else None
-        rest = rest_markers(frames, before, self.plan.layout, self.plan.file.table.limits.max_rest_error_px)
+        before = self._rest.markers if check and self._rest is not None else None
+        layout, limits = self.plan.layout, self.plan.file.table.limits
+        rest = rest_markers(frames, before, layout, limits.max_rest_error_px)
         tracker = self.plan.tracker(rest)
-        self._rest, self.tracker = rest, tracker
+        with self._changed:
+            past = [one for one in self._past if one.number >= frames[0].index]
+        self._rest, self.tracker = AtRest.of(rest, past, layout, limits), tracker
 
     def close(self) -> None:
         """End all threads; a driver that does not return is left alone."""
@@ -170,11 +176,15 @@ class Sensor:
                     continue
                 last = frames[0].number
                 result = self._read(frames, last - dropped_before - 1, self._log.since(events))
+                past = past_of(result, frames[0].image, self._rest)
+                if self._rest is None and result.views and all(view.markers.found for view in result.views):
+                    markers, limits = [view.markers for view in result.views], self.plan.file.table.limits
+                    self._rest = AtRest.of(markers, [past], self.plan.layout, limits)
                 dropped_before, events = last, events + len(result.events)
                 with self._changed:
                     self._results.append(result)
                     self.count += 1
-                    self._timings.append(Timing(result.index, result.taken_s, result.latency_ms))
+                    self._past.append(past)
                     self._changed.notify_all()
         except Exception as error:  # a fault of the reader must reach those who wait
             self._failure = f"the reader failed: {type(error).__name__}: {' '.join(str(error).split())}"
@@ -227,6 +237,4 @@ class Sensor:
             tracked=tracked,
             events=events,
         )
-        if self._rest is None and result.views and all(view.markers.found for view in result.views):
-            self._rest = tuple(view.markers for view in result.views)
         return result

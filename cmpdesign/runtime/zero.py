@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +56,7 @@ def rest_markers(
     for place, views in enumerate(zip(*(one.views for one in frames), strict=True)):
         markers = _mean([view.markers for view in views], name)
         if before is not None:
-            _require_untouched(markers, before[place].xy_px, layout, most_px, name)
+            _require_untouched(motion_of(markers, before[place].xy_px, layout, most_px), name)
         found.append(markers)
     return tuple(found)
 
@@ -83,24 +83,59 @@ def _mean(several: Sequence[Markers], name: str) -> Markers:
     return replace(several[-1], xy_px=xy_px.mean(axis=0), cov_px2=cov_px2, status=status)
 
 
-def _require_untouched(
-    markers: Markers, rest_px: NDArray[Any], layout: Reference, most_px: float | None, name: str
-) -> None:
+class WayFromRest(NamedTuple):
+    """The way of the markers of a view from the rest frame, RMS over markers and axes; NaN where it is not known.
+
+    Attributes:
+        way_px: all of it.
+        drift_px: of the affine map that fits best; NaN while the pattern is touched.
+        bend_px: what is left after this map.
+        limit_px: the largest ``bend_px`` of a pattern that is not touched.
+    """
+
+    way_px: float
+    drift_px: float
+    bend_px: float
+    limit_px: float
+
+    @property
+    def is_touched(self) -> bool:
+        """False also where it is not known."""
+        return self.bend_px > self.limit_px
+
+
+def motion_of(
+    markers: Markers, rest_px: NDArray[Any], layout: Reference, most_px: float | None
+) -> WayFromRest:
+    """The way from the rest frame.
+
+    Args:
+        markers: of a view.
+        rest_px: (M, 2) at rest.
+        layout: the pad.
+        most_px: limit of ``bend_px``; None: by the stated deviations.
+    """
     moved_px = markers.xy_px - rest_px
     known = np.isfinite(moved_px).all(axis=1) & (markers.status == 1)
-    if known.sum() < FEWEST_SHARE * known.size:
-        return
+    if known.sum() < max(FEWEST_SHARE * known.size, 4):
+        return WayFromRest(float("nan"), float("nan"), float("nan"), float("nan"))
     design = np.column_stack([np.ones(known.sum()), layout.xy_mm[known]])
-    left_px = moved_px[known] - design @ np.linalg.lstsq(design, moved_px[known], rcond=None)[0]
-    bend_px = float(np.sqrt(np.mean(left_px**2)))
+    drift_px = design @ np.linalg.lstsq(design, moved_px[known], rcond=None)[0]
+    way, drift, bend = (
+        float(np.sqrt(np.mean(one**2))) for one in (moved_px[known], drift_px, moved_px[known] - drift_px)
+    )
     # the former rest frame has the noise of one frame, or less
     by_noise_px = MOST_BEND * _sigma_px(markers.cov_px2[known]) * float(np.sqrt(FRAMES + 1))
-    limit_px = by_noise_px if most_px is None else most_px
-    if bend_px > limit_px:
+    limit = by_noise_px if most_px is None else most_px
+    return WayFromRest(way, float("nan") if bend > limit else drift, bend, limit)
+
+
+def _require_untouched(motion: WayFromRest, name: str) -> None:
+    if motion.is_touched:
         raise TouchedError(
-            f"{name}: no rest frame: something touches the pattern, which is bent by {bend_px:.3f} px (RMS) against "
-            f"the former rest frame, at most {limit_px:.3f} px are at rest; take the contact away, or give check=False "
-            "if the former rest frame was wrong"
+            f"{name}: no rest frame: something touches the pattern, which is bent by {motion.bend_px:.3f} px (RMS) "
+            f"against the former rest frame, at most {motion.limit_px:.3f} px are at rest; take the contact away, or "
+            "give check=False if the former rest frame was wrong"
         )
 
 

@@ -106,12 +106,13 @@ class Build:
     def follow(self) -> None:
         """Take the messages of the process until its end; runs in a thread."""
         assert self.process.stderr is not None
-        for line in self.process.stderr:
-            message = _document(line)
-            text = str(message.get("text", line)) if isinstance(message, dict) else line
-            is_error = isinstance(message, dict) and message.get("level") == "error"
-            self.error = text if is_error else self.error
-            self.lines.append(text.strip())
+        with self.process.stderr as lines:
+            for line in lines:
+                message = _document(line)
+                text = str(message.get("text", line)) if isinstance(message, dict) else line
+                is_error = isinstance(message, dict) and message.get("level") == "error"
+                self.error = text if is_error else self.error
+                self.lines.append(text.strip())
         ended = self.process.wait()
         if self.canceled:
             return

@@ -273,7 +273,7 @@ def frame_document(frame: Any, frames_per_s: float) -> dict[str, Any]:
 
 
 def contact_document(contact: ContactForce, found: NDArray[Any]) -> dict[str, Any]:
-    """Force and torque with their deviations, the pressure above the found markers, the regions' centres."""
+    """Force and torque with their deviations, pressure and shear above the found markers, the regions' centres."""
     known = bool(np.isfinite(contact.force_n).all())
     values: dict[str, Any] = {"reason": contact.reason.text, "known": known}
     if known:
@@ -285,6 +285,7 @@ def contact_document(contact: ContactForce, found: NDArray[Any]) -> dict[str, An
             "force_n": contact.force_n.round(4).tolist(),
             "torque_nmm": contact.torque_nmm.round(3).tolist(),
         }
+        values["shear_mpa"] = np.nan_to_num(contact.marker_traction_mpa[found, :2]).round(5).tolist()
         values["pressure_mpa"] = np.nan_to_num(-contact.marker_traction_mpa[found, 2]).round(5).tolist()
         values["utilisation"] = round(contact.utilisation, 3) if np.isfinite(contact.utilisation) else None
         values["regions"] = [region.centre_mm.round(3).tolist() for region in contact.regions]

@@ -57,6 +57,7 @@ def serve(
         access_log=False,
         server_header=False,
         ws_max_size=MOST_MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # images are compressed already
         limit_concurrency=MOST_CONNECTIONS,
         timeout_graceful_shutdown=3,
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.suites.lenses.cameras import SIZE_PX, TrueCamera, place_sheet
 from cmpdesign.layout.layout import Layout
-from cmpdesign.scene import Optics, Pinhole, Scene, Sensor, render
+from cmpdesign.scene import Optics, Pinhole, Plain, Scene, Sensor, render
 
 Array = NDArray[np.float64]
 
@@ -55,9 +55,14 @@ def bent_sheet(height_mm: float, half_mm: float, angle: float) -> Callable[[Arra
 
 
 def take_pictures(
-    camera: TrueCamera, layout: Layout, count: int, conditions: Conditions, rng: np.random.Generator
+    camera: TrueCamera,
+    layout: Layout,
+    count: int,
+    conditions: Conditions,
+    rng: np.random.Generator,
+    background: Plain | None = None,
 ) -> list[NDArray[Any]]:
-    """``count`` pictures (H, W, 3) uint8 BGR of one sheet."""
+    """``count`` pictures (H, W, 3) uint8 BGR of one sheet; without a background it lies on the pattern's black."""
     half_mm, angle = float(np.hypot(*layout.outline_mm.T).max()), float(rng.uniform(0, np.pi))
     bad = dict(conditions.bad)
     optics = Optics(float(rng.uniform(0.7, 1.4)))
@@ -73,6 +78,8 @@ def take_pictures(
             fx, fy = pose.focal_px
             pose = replace(pose, focal_px=(fx * (1 + FOCUS_SHARE), fy * (1 + FOCUS_SHARE)))
         scene = Scene(layout, pose, surface, optics=optics, sensor=sensor, seed=int(rng.integers(1 << 30)))
+        if background is not None:
+            scene = replace(scene, background=background)
         image = render(scene, size=SIZE_PX).image
         pictures.append(_moved(image) if kind == "moved" else image)
     return pictures

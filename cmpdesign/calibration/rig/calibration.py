@@ -88,25 +88,26 @@ def calibrate_rig_markers(
     """
     start = replace(rig, deviations=()).without_poses()
     flat_mm = np.column_stack([layout.xy_mm, np.zeros(len(layout.xy_mm))])
-    at_rest = _mean_of([_as_step(one, 0.0) for one in rest])
+    at_rest = mean_of([as_step(one, 0.0) for one in rest])
     poses = estimate_poses(start.views, layout.xy_mm, at_rest.xy_px, at_rest.cov_px2, (0.0, 0.0, 0.0))
     at_rest = at_rest._replace(xy_px=np.where(poses.used[:, None], at_rest.xy_px, np.nan))
     unknowns = Unknowns(poses.views, tuple(rig.medium_deviation))
     _require_covariance(camera_cov, unknowns)
     stated = unknowns.stated(camera_cov, dict(rig.medium_deviation))
-    pressed = tuple(_as_step(found, press_mm) for press_mm, found in steps.items())
+    pressed = tuple(as_step(found, press_mm) for press_mm, found in steps.items())
     problem = RigProblem(unknowns, stated, flat_mm, at_rest, pressed, step_sigma_mm)
     found = adjust_rig(problem, poses.views)
     _require_plate(problem, found)
     return _summary(problem, found, rig)
 
 
-def _as_step(markers: Sequence[Markers], press_mm: float) -> RigStep:
+def as_step(markers: Sequence[Markers], press_mm: float) -> RigStep:
+    """The measured markers of a picture, view by view."""
     measured = [np.where((m.status == Status.MEASURED)[:, None], m.xy_px, np.nan) for m in markers]
     return RigStep(press_mm, np.stack(measured), np.stack([m.cov_px2 for m in markers]))
 
 
-def _mean_of(pictures: Sequence[RigStep]) -> RigStep:
+def mean_of(pictures: Sequence[RigStep]) -> RigStep:
     """Means of the markers over pictures at rest, weighted by information."""
     if len(pictures) == 1:
         return pictures[0]
@@ -165,16 +166,19 @@ def _summary(problem: RigProblem, found: AdjustedRig, rig: Rig) -> RigCalibratio
     )
 
 
-def _displacements(problem: RigProblem, views: Sequence[View], deviating: Sequence[Sequence[View]]) -> Array:
-    """(K, 3, M, 3) mm by which displacements of ``_press_mm`` along z, x and y are read wrong."""
-    rest, press_mm = problem.rest_mm, _press_mm(views)
-    moved = [deviating_moves(views, deviating, rest, problem.rest.cov_px2)]
+def misread_displacements(
+    rest_mm: Array, cov_px2: Array, views: Sequence[View], deviating: Sequence[Sequence[View]]
+) -> Array:
+    """(K, 3, M, 3) mm by which displacements of ``PRESS_MM`` along -z, x and y are read wrong, if K others are true."""
+    press_mm = press_of(views)
+    moved = [deviating_moves(views, deviating, rest_mm, cov_px2)]
     for axis in (-np.eye(3)[2], np.eye(3)[0], np.eye(3)[1]):
-        moved.append(deviating_moves(views, deviating, rest + press_mm * axis, problem.rest.cov_px2))
+        moved.append(deviating_moves(views, deviating, rest_mm + press_mm * axis, cov_px2))
     return np.stack([one - moved[0] for one in moved[1:]], axis=1)
 
 
-def _press_mm(views: Sequence[View]) -> float:
+def press_of(views: Sequence[View]) -> float:
+    """``PRESS_MM``, or less where the gel is thin."""
     medium = views[0].medium
     return PRESS_MM if medium is None or not medium.gel_mm else min(PRESS_MM, MOST_GEL * medium.gel_mm)
 
@@ -182,8 +186,9 @@ def _press_mm(views: Sequence[View]) -> float:
 def _depth_share(problem: RigProblem, views: Sequence[View], modes: Sequence[Deviation]) -> float:
     if not modes:
         return 0.0
-    read = _displacements(problem, views, [one.applied(views) for one in modes])[:, 0, :, 2]
-    return float(np.sqrt(np.nanmean((read**2).sum(axis=0))) / _press_mm(views))
+    deviating = [one.applied(views) for one in modes]
+    read = misread_displacements(problem.rest_mm, problem.rest.cov_px2, views, deviating)[:, 0, :, 2]
+    return float(np.sqrt(np.nanmean((read**2).sum(axis=0))) / press_of(views))
 
 
 def _independent(problem: RigProblem, found: AdjustedRig) -> tuple[Deviation, ...]:
@@ -192,7 +197,8 @@ def _independent(problem: RigProblem, found: AdjustedRig) -> tuple[Deviation, ..
     values, vectors = np.linalg.eigh(found.cov / sigma / sigma[:, None])
     roots = (vectors * np.sqrt(np.maximum(values, 0.0))) * sigma[:, None]  # (P, P), columns
     variants = [unknowns.deviation(column).applied(found.views) for column in roots.T]
-    effects = _displacements(problem, found.views, variants).reshape(len(variants), -1)
+    effects = misread_displacements(problem.rest_mm, problem.rest.cov_px2, found.views, variants)
+    effects = effects.reshape(len(variants), -1)
     effects = effects[:, np.isfinite(effects).all(axis=0)]
     left, strength, _ = np.linalg.svd(effects, full_matrices=False)
     total = np.cumsum(strength**2)

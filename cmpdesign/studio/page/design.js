@@ -26,10 +26,10 @@ export class DesignPart {
       if (found) design.setCamera([Number(found[1]), Number(found[2])]); else toast("camera: expected width x height in px, as in 640x480");
     } });
     this.element = h("div", { class: "work" }, h("aside", { class: "side", "aria-label": "Parameters" }, this.form.element), this.frame,
-      h("aside", { class: "side right", "aria-label": "Findings and figures" }, this.findings, this.figures,
+      h("aside", { class: "side right", "aria-label": "Findings and figures" },
         h("div", { class: "box" }, h("label", { for: "camera" }, "Camera that the pattern fills, px"), camera,
           h("div", { class: "row" }, h("button", { onclick: () => this.#editToml() }, "TOML"), h("button", { onclick: () => save(`${design.fields.name || "design"}.toml`, this.toml ?? "") }, "Save"),
-            h("button", { onclick: () => told(async () => { await navigator.clipboard.writeText(location.href.replace(/\/\?token=[^#]*/, "/")); toast("The link holds the whole design."); }) }, "Copy link")))));
+            h("button", { onclick: () => told(async () => { await navigator.clipboard.writeText(location.href.replace(/\/\?token=[^#]*/, "/")); toast("The link holds the whole design."); }) }, "Copy link"))), this.findings, this.figures));
     this.#press(this.bar);
     design.listen(() => this.refresh());
   }

@@ -8,7 +8,7 @@ import { StartPart } from "./start.js";
 import { design } from "./state.js";
 import { TouchPart } from "./touch.js";
 
-const PARTS = { start: ["Start", StartPart], design: ["Design", DesignPart], make: ["Make", MakePart], read: ["Read", ReadPart], touch: ["Touch", TouchPart] };
+const PARTS = { start: StartPart, design: DesignPart, make: MakePart, read: ReadPart, touch: TouchPart };
 const content = document.getElementById("content"), tabs = document.getElementById("tabs"), made = {};
 const undo = document.getElementById("undo"), redo = document.getElementById("redo");
 
@@ -24,10 +24,11 @@ function refreshTools() {
 
 function show(start) {
   const name = /^#\/(\w+)/.exec(location.hash)?.[1], part = name in PARTS ? name : "start";
-  made[part] ??= new PARTS[part][1](start);
-  content.replaceChildren(h("h1", { class: "skip" }, PARTS[part][0]), made[part].element);
+  const title = [...tabs.children].find((link) => link.dataset.part === part).textContent;
+  made[part] ??= new PARTS[part](start);
+  content.replaceChildren(h("h1", { class: "skip" }, title), made[part].element);
   for (const link of tabs.children) link.dataset.part === part ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
-  document.title = `${PARTS[part][0]} · cmpdesign studio`;
+  document.title = `${title} · cmpdesign studio`;
   made[part].shown?.();
   made[part].refresh?.();
 }
@@ -36,7 +37,6 @@ async function begin() {
   chooseTheme();
   design.readLink();
   const start = await ask("/api/start");
-  tabs.replaceChildren(...Object.entries(PARTS).map(([name, [title]]) => h("a", { href: `#/${name}`, "data-part": name }, title)));
   document.getElementById("theme").addEventListener("click", () => {
     const name = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
     localStorage.setItem("cmpdesign.theme", name);

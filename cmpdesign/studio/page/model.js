@@ -37,7 +37,11 @@ export class Model {
     this.#fit(group);
     const heights = this.parts.map((part) => new three.Box3().setFromObject(part).getCenter(new three.Vector3()).y);
     const order = [...heights.keys()].sort((one, other) => heights[one] - heights[other]);
-    for (const part of this.parts) { part.material.clippingPlanes = [this.plane]; part.material.side = three.DoubleSide; }
+    for (const { material } of this.parts) {
+      material.clippingPlanes = [this.plane];
+      // Faces of a clear part that touch another part are not seen, and what is behind them is.
+      if (material.transparent) material.depthWrite = false; else material.side = three.DoubleSide;
+    }
     const slider = (name, value, act) => h("label", {}, name, h("input", { type: "range", min: 0, max: 1, step: 0.01, value, oninput: (event) => { act(Number(event.target.value)); this.draw(); } }));
     const explode = (share) => { order.forEach((part, rank) => { this.parts[part].position.y = share * rank * Math.max(size.y, radius / 6) * 0.6; }); this.#fit(group); };
     const cut = (share) => { this.plane.constant = box.min.z + (1 - share) * (box.max.z - box.min.z) * 1.001; };

@@ -63,15 +63,18 @@ export class ReadPart {
   }
 
   async #read(blob, name) {
-    this.result.replaceChildren(h("div", { class: "box" }, h("p", { class: "soft" }, `Reading ${name}.`)));
+    this.#list(name);
+    this.result.classList.add("stale");
     try {
       const query = new URLSearchParams({ name, fields: JSON.stringify(design.fields), layout: this.layout.key });
       const found = await ask(`/api/readings?${query}`, { body: blob });
       this.readings.push(found);
       await this.#choose(found);
     } catch (error) {
+      this.#list();
       this.result.replaceChildren(h("div", { class: "box" }, h("div", { class: "finding error", role: "alert" }, h("b", { class: "error" }, "Not read"), error.message)));
     }
+    this.result.classList.remove("stale");
   }
 
   async #choose(found) {
@@ -82,17 +85,24 @@ export class ReadPart {
     this.shownPicture = found.xy && !found.xy.length && found.stages.length ? found.stages.at(-1) : "picture";
     this.#show();
     await this.#compare();
+    if (this.shownPicture !== "picture") this.stage.fit();
   }
 
   #show() {
     const actions = { stage: (name) => { this.shownPicture = name; this.#draw(); }, address: (stage) => this.#address(this.found, stage) };
     this.result.replaceChildren(...resultBoxes(this.found, actions));
-    this.list.hidden = false;
-    const isRest = this.found === this.rest;
-    this.list.replaceChildren(h("h2", {}, this.readings.length === 1 ? "Picture" : `${this.readings.length} pictures`),
+    this.#list();
+  }
+
+  // The pictures; awaited: the name of one that is being read.
+  #list(awaited) {
+    const count = this.readings.length + (awaited ? 1 : 0), isRest = this.found && this.found === this.rest;
+    this.list.hidden = !count;
+    this.list.replaceChildren(h("h2", {}, count === 1 ? "Picture" : `${count} pictures`),
       h("div", { class: "pictures", role: "group", "aria-label": "Pictures" }, this.readings.map((one) => h("button", { "aria-pressed": String(one === this.found), title: one.name, onclick: () => told(async () => this.#choose(one)) },
-        h("img", { src: this.#address(one, "picture"), alt: "", loading: "lazy" }), h("span", {}, `${one === this.rest ? "Rest: " : ""}${one.name}`)))),
-      h("div", { class: "row" }, h("button", { "aria-pressed": String(isRest), disabled: !this.found.xy?.length, onclick: () => this.#setRest(isRest ? null : this.found) }, "This is rest"),
+        h("img", { src: this.#address(one, "picture"), alt: "", loading: "lazy" }), h("span", {}, `${one === this.rest ? "Rest: " : ""}${one.name}`))),
+        awaited && h("button", { disabled: true, title: awaited }, h("i", { class: "blank" }), h("span", {}, `Reading ${awaited}`))),
+      h("div", { class: "row" }, h("button", { "aria-pressed": String(Boolean(isRest)), disabled: !this.found?.xy?.length, onclick: () => this.#setRest(isRest ? null : this.found) }, "This is rest"),
         h("button", { onclick: () => { this.readings = []; this.rest = this.found = null; this.list.hidden = true; this.result.replaceChildren(); this.stage.show([0, 0, 1, 1]); this.note.hidden = true; } }, "Remove all")),
       h("div", { class: "row" }, h("label", { class: "row grow" }, "Record", this.kind ??= h("select", {}, KINDS.map(([value, text]) => h("option", { value }, text)))), h("button", { onclick: () => this.#record() }, "Save as track does")));
   }
@@ -140,13 +150,14 @@ export class ReadPart {
 
   #draw() {
     if (!this.found) return;
-    const { size_px: [width, height], xy, status, edges, cov, quality } = this.found, layers = [], notes = [];
+    const { size_px: [width, height], xy, status, edges, cov, quality, explained } = this.found, layers = [], notes = [];
     // The centre of the top-left pixel is (0, 0).
     layers.push(h("image", { href: this.#address(this.found, this.shownPicture), x: -0.5, y: -0.5, width, height }));
     const enlarged = 10 ** Number(this.scale.value);
     if (xy && this.shownPicture === "picture") {
       if (this.look.grid) layers.push(h("path", { class: "gridlines", d: edges.map(([from, to]) => `M${xy[from]}L${xy[to]}`).join("") }));
       layers.push(h("g", { class: "dots", "stroke-width": 5 }, [1, 2, 3].map((code) => h("path", { class: `s${code}`, d: xy.filter((_, at) => status[at] === code).map((point) => `M${point}h0`).join("") }))));
+      if (explained) layers.push(h("path", { class: "covered", d: xy.filter((_, at) => !explained[at]).map((point) => `M${point}h0`).join("") }));
       if (this.look.ellipses) {
         const sigmas = cov.map(([xx, , yy]) => Math.sqrt(xx + yy)).sort((one, other) => one - other);
         const factor = roundFactor((0.35 * (quality?.edge_px ?? 20)) / (sigmas[sigmas.length >> 1] || 1));

@@ -27,8 +27,8 @@ function patternBoxes(found, { stage, address }) {
   const missed = Object.keys(STAGES).filter((name) => !found.stages.includes(name));
   const bars = Object.entries(times).map(([name, ms]) => { const bar = h("i"); bar.style.width = `${(100 * ms) / most}%`; return h("div", {}, name, bar, h("em", {}, `${ms.toFixed(1)} ms`)); });
   return [
-    box("Markers", figures([["Measured", `${found.measured} of ${found.present}`], ["Repaired", found.repaired], ["Fitted", found.fitted], ["Lost", found.lost], ["Cells of another color", found.contradictions.length]]),
-      h("span", { class: "legend" }, ["measured", "repaired", "fitted"].map((name, at) => h("span", { class: `l${at + 1}` }, name)))),
+    box("Markers", figures([["Measured", `${found.measured} of ${found.present}`], ["Repaired", found.repaired], ["Fitted", found.fitted], ["Lost", found.lost], ["Covered", found.explained ? found.explained.filter((one) => !one).length : "–"], ["Cells of another color", found.contradictions.length]]),
+      h("span", { class: "legend" }, ["measured", "repaired", "fitted", "covered"].map((name, at) => h("span", { class: `l${at + 1}` }, name)))),
     quality && quality.edge_px !== null ? box("Picture", figures([["Size", `${found.size_px.join(" × ")} px`], ["Blur", `${number(quality.blur_px, 3)} px`], ["Noise", `${number(quality.noise, 3)} of 255`], ["Contrast", number(quality.contrast, 3)],
       ["Overexposed", quality.clipping === null ? "–" : `${number(100 * quality.clipping, 2)} %`], ["Evenness of light", number(quality.evenness, 2)], ["Gridline", `${number(quality.edge_px, 3)} px`]])) : "",
     box(`Stages, ${total.toFixed(1)} ms`, h("div", { class: "stages" }, thumbnail("picture", "picture"), found.stages.map((name) => thumbnail(name, STAGES[name] ?? name))),

@@ -26,7 +26,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 import cmpdesign
-from cmpdesign.runtime.publishing import SensorRecorder
+from cmpdesign.runtime.publish.results import SensorRecorder
 from cmpdesign.tracking.recording.messages import DIAGNOSTICS, ERROR, POINTS, WRENCH, Messages, Stamp
 
 WAIT_S = 0.5  # for a result, before the sensor counts as late

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,6 +15,8 @@ from numpy.typing import NDArray
 
 import cmpdesign
 from cmpdesign.calibration.rig.calibration import RigCalibration, calibrate_rig_markers
+from cmpdesign.calibration.rig.causes import FOCUS, GEL, LOCAL, PAD, SIZE, VIEWS
+from cmpdesign.calibration.rig.check import check_markers
 from cmpdesign.calibration.rig.mirrors import mirror_pairs
 from cmpdesign.calibration.rig.unknowns import Unknowns
 from cmpdesign.evaluation.simulated.sensor import parse_sensor
@@ -86,14 +90,20 @@ def true_values() -> Array:
     return np.array([*lens, TRUE.gel_mm, TRUE.gel_index, TRUE.window_mm])
 
 
-def test_a_sensor_is_calibrated_from_its_pictures(folder: Path) -> None:
-    output = folder / "sensor.toml"
+@pytest.fixture(scope="module")
+def document(folder: Path) -> dict[str, Any]:
+    """The answer of ``calibrate rig``, which has written sensor.toml."""
     command = ("calibrate", "rig", folder / "layout.json", folder / "measured.toml", folder / "rest.png")
     command += ("--side", "back")
     plates = ("--step", f"0.3={folder / 'plate3.png'}", "--step", f"0.9={folder / 'plate9.png'}")
-    result = run(*command, *plates, "-o", output, "--json")
+    result = run(*command, *plates, "-o", folder / "sensor.toml", "--json")
     assert result.exit_code == 0, result.output
-    document = json.loads(result.stdout)
+    found: dict[str, Any] = json.loads(result.stdout)
+    return found
+
+
+def test_a_sensor_is_calibrated_from_its_pictures(folder: Path, document: dict[str, Any]) -> None:
+    output = folder / "sensor.toml"
     values = np.array(list(document["parameters"].values()))
     stated = np.array(list(document["stated"].values()))
     deviations = np.array(list(document["deviations"].values()))[: len(values)]
@@ -121,6 +131,37 @@ def test_a_sensor_is_calibrated_from_its_pictures(folder: Path) -> None:
     assert shape.displacement_systematic_mm[deepest, 2] == pytest.approx(
         document["depth_share"] * PRESS_MM, rel=1.0
     )
+
+
+def test_a_sensor_is_checked_by_new_pictures(folder: Path, document: dict[str, Any], tmp_path: Path) -> None:
+    words = ("calibrate", "check", folder / "sensor.toml")
+    same = run(*words, folder / "rest.png", "--json")
+    assert same.exit_code == 0, same.output
+    found = json.loads(same.stdout)
+    assert found["holds"] and found["misfit"] < 1.3 and found["steps"] == []
+    assert found["stated_px"] == pytest.approx(document["rms_px"], rel=1e-3)
+    assert found["rms_px"] == pytest.approx(document["rms_px"], rel=0.2)
+    touched = run(*words, folder / "rest.png", folder / "press.png")
+    assert touched.exit_code == 1 and "touched" in touched.output and "without contact" in touched.output
+    # a lens that shows all a hundredth smaller than the file says
+    text = (folder / "sensor.toml").read_text()
+    larger = [line if "focal_px" not in line else _times(line, 1.01) for line in text.splitlines()]
+    (tmp_path / "sensor.toml").write_text("\n".join(larger))
+    shutil.copy(folder / "layout.json", tmp_path)
+    refocused = run("calibrate", "check", tmp_path / "sensor.toml", folder / "rest.png", "--json")
+    assert refocused.exit_code == 1
+    found = json.loads(refocused.stdout)
+    first = found["causes"][0]
+    assert first["cause"] == FOCUS and first["likely"] and "calibrate camera" in found["steps"][0]
+    assert first["changes"]["left+right.focal_share"] == pytest.approx(-0.01, abs=0.001)
+    assert "first: cmpdesign calibrate rig" in refused(
+        "calibrate", "check", folder / "measured.toml", folder / "rest.png"
+    )
+
+
+def _times(line: str, factor: float) -> str:
+    name, _, values = line.partition("=")
+    return f"{name}= {[value * factor for value in json.loads(values)]}"
 
 
 def test_bad_input_is_one_line_and_writes_nothing(folder: Path) -> None:
@@ -160,6 +201,46 @@ def drawn_rig(views: tuple[View, ...], rng: np.random.Generator) -> Rig:
         ),
         DEVIATION,
     )  # fmt: skip
+
+
+def _refocused(view: View) -> View:
+    return replace(view, focal_px=(view.focal_px[0] * 1.003, view.focal_px[1] * 1.003))
+
+
+def _remounted(view: View) -> View:
+    turn = cv2.Rodrigues(np.array([0.01, 0.02, -0.03]))[0]
+    shift = view.t_camera_from_layout_mm + view.R_camera_from_layout @ [0.2, 0.1, 0.05]
+    return view.at(view.R_camera_from_layout @ turn, shift)
+
+
+CHANGES = {
+    "nothing": ((), lambda view: view, 1.0),
+    "focus": ((FOCUS,), _refocused, 1.0),
+    "pad": ((PAD,), _remounted, 1.0),
+    "mirror": ((VIEWS,), lambda view: view.turned([0.002, 0, 0.001, 0, 0, 0]) if view.name == "left" else view, 1.0),
+    "gel": ((GEL,), lambda view: replace(view, medium=replace(TRUE, gel_mm=3.3, gel_index=1.43)), 1.0),
+    "size": ((SIZE,), lambda view: view, 1.002),
+    "touch": ((LOCAL,), lambda view: view, 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_the_cause_of_larger_residuals_is_named(change: str) -> None:
+    rng, layout, views = np.random.default_rng([46, 3]), reference(layers=5), sensor_views()
+    likely, changed, size = CHANGES[change]
+    places = pressed(layout.xy_mm, 0.2) if change == "touch" else flat(layout) * size
+    rest = [[noisy(layout, changed(view), places, rng, 0.01) for view in views] for _ in range(2)]
+    found = check_markers(layout, Rig(views), rest, stated_px={})
+    assert found.holds == (change == "nothing")
+    assert found.likely == likely
+    if change == "focus":  # the file's focal length is smaller than the true one, so that all is read larger
+        deeper = pressed(layout.xy_mm, 0.5)
+        read = [noisy(layout, changed(view), deeper, rng, 1e-4) for view in views]
+        still = [noisy(layout, changed(view), flat(layout), rng, 1e-4) for view in views]
+        shape = Reconstructor(layout, Rig(views), still).reconstruct(read)
+        deep = deeper[:, 2] < -0.25
+        ratio = shape.displacement_mm[deep, 2] / deeper[deep, 2]
+        assert found.depth_error == pytest.approx(ratio.mean() - 1, abs=0.002)
 
 
 def test_two_mirrors_are_found_up_to_a_turn_about_their_common_line() -> None:

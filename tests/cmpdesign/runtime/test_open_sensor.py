@@ -7,6 +7,7 @@ import pickle
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,16 +19,18 @@ from rosbags.typesys import Stores, get_typestore
 
 import cmpdesign
 from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_opencv, write_sensor
+from cmpdesign.errors import CmpDesignError
 from cmpdesign.runtime.events import EventKind
 from cmpdesign.runtime.pairing import nearest_places
+from cmpdesign.runtime.publish.serving import SensorServer
 from cmpdesign.runtime.sensor import LateError
-from cmpdesign.runtime.serving import SensorServer
 from cmpdesign.runtime.zero import TouchedError
 from cmpdesign.scene import Press
 from cmpdesign.sensor.tables import SensorError
 from extractor import FrameStatus
 from tests.support.layouts import small_text
 from tests.support.tracking.foxglove_client import Received, open_client, take
+from tests.support.tracking.messages import read_messages
 from tests.support.tracking.press import write_press
 from tests.support.tracking.scenes import LAYERS, errors, moving, shot
 
@@ -207,6 +210,75 @@ def test_zero_takes_the_mean_at_rest_and_refuses_a_touched_pattern(folder: Path,
         time.sleep(0.1)
         with pytest.raises(TouchedError, match="the markers move by"):
             sensors.zero()
+
+
+def test_health_says_what_has_changed_since_the_rest(folder: Path, plug: Plug) -> None:
+    """A scratched marker is learnt by ``zero``; dim or tinted light, a blur and a drift are told with their figures."""
+    clean = shot().image
+    x, y = np.rint(shot().truth.marker_xy_px[40]).astype(int)
+    scratched = clean.copy()
+    cv2.circle(scratched, (int(x), int(y)), 10, (150, 150, 150), -1)
+    shown = scratched
+    plug(TimedCamera(lambda number: shown, FPS))
+    with opened(folder / "thumb.toml") as sensors:
+
+        def health(image: Any) -> Any:
+            nonlocal shown
+            shown = image
+            count = sensors.thumb.count
+            while sensors.thumb.count < count + 10:
+                sensors.thumb.wait(after=sensors.thumb.results[-1].index)
+            found = sensors.thumb.health
+            advice = [one for one in found.advice if "frames have no result" not in one]  # a busy machine
+            return replace(found, advice=tuple(advice))
+
+        sensors.zero(check=False)
+        good = health(scratched)
+        assert good.share_read == 1.0 and good.left_out == 3 and good.advice == ()
+        assert good.light == pytest.approx(1, abs=0.01) and good.drift_px < 0.02
+        dim = health((0.5 * scratched).astype(np.uint8))
+        assert dim.light == pytest.approx(0.5, abs=0.02) and max(dim.tint) < 1.05
+        assert any("has 50% of its brightness" in one or "has 49%" in one for one in dim.advice)
+        tinted = health((scratched * (1.0, 0.8, 0.6)).astype(np.uint8))
+        assert any("blue is 1.2" in one or "blue is 1.3" in one for one in tinted.advice)
+        blurred = health(cv2.GaussianBlur(scratched, (0, 0), 1.6))
+        expected_px = np.hypot(good.qualities[0].blur_px, 1.6)
+        assert blurred.qualities[0].blur_px == pytest.approx(expected_px, abs=0.15)
+        assert any(one.startswith("refocus: the blur is") for one in blurred.advice)
+        moved = health(np.roll(scratched, 2, axis=1))
+        assert moved.drift_px == pytest.approx(2 / np.sqrt(2), abs=0.05)
+        assert any("zero the sensor" in one for one in moved.advice)
+        sensors.zero()
+        assert health(np.roll(scratched, 2, axis=1)).advice == ()
+        bare = health(np.roll(clean, 2, axis=1))
+        assert bare.left_out == good.left_out and bare.share_read == 1.0
+
+
+def test_a_recording_of_running_sensors_has_their_gaps(folder: Path, plug: Plug, shots: list[Any]) -> None:
+    """Read by the library of the format: every result is there, and the gap is told in the diagnostics."""
+    images = [one.image for one in shots]
+    plug(TimedCamera(images, FPS, [Fault("stall", 0.5, 0.9)]), TimedCamera(images, FPS))
+    path = folder / "run.mcap"
+    with opened(folder / "thumb.toml", folder / "index.toml") as sensors:
+        with pytest.raises(CmpDesignError, match=r"ends in \.mcap"):
+            sensors.record(folder / "run.npz")
+        sensors.wait()
+        recording = sensors.record(path)
+        after(sensors.thumb, EventKind.RESUMED)
+        sensors.thumb.wait(after=sensors.thumb.results[-1].index + 1)
+        assert not path.exists()
+    messages = read_messages(path)
+    counts = [len(messages[f"/{name}/markers"]) for name in ("thumb", "index")]
+    assert sum(counts) == recording.frames == len(messages["/diagnostics"]) and min(counts) > 0
+    assert recording.missed == 0
+    told = [
+        pair.value
+        for one in messages["/diagnostics"]
+        for pair in one.decoded_message.status[0].values
+        if pair.key == "events"
+    ]
+    assert any("frames again after" in text for text in told) and "" in told
+    recording.close()
 
 
 def test_a_surface_of_recorded_views(tmp_path: Path) -> None:

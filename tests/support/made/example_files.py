@@ -120,7 +120,9 @@ def _write_sheet(folder: Path) -> None:
     cv2.imwrite(str(folder.parent / "pad.png"), pictures[0])
     true = camera.pinhole
     text = _view_text(true.focal_px, true.centre_px, true.distortion)
-    (folder.parent / "measured.toml").write_text(text, encoding="utf-8")
+    (folder.parent / "measured.toml").write_text('layout = "layout.json"\n' + text, encoding="utf-8")
+    files = [folder.parent / name for name in ("layout.json", "measured.toml", "pad.png")]
+    assert run("calibrate", "rig", *files, "-o", folder.parent / "index.toml").exit_code == 0
 
 
 def _view_text(focal_px: Sequence[float], centre_px: Sequence[float], distortion: Sequence[float]) -> str:

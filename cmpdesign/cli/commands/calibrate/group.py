@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from cmpdesign.cli.command import Command, Group, examples
-from cmpdesign.cli.commands.calibrate import camera, force, gel, pattern, rig
+from cmpdesign.cli.commands.calibrate import camera, check, force, gel, pattern, rig
 
 app = typer.Typer(
     cls=Group,
@@ -17,6 +17,7 @@ app = typer.Typer(
 
 
 app.command("camera", cls=Command, epilog=examples(*camera.EXAMPLES))(camera.camera)
+app.command("check", cls=Command, epilog=examples(*check.EXAMPLES))(check.check)
 app.command("force", cls=Command, epilog=examples(*force.EXAMPLES))(force.force)
 app.command("gel", cls=Command, epilog=examples(*gel.EXAMPLES))(gel.gel)
 app.command("pattern", cls=Command, epilog=examples(*pattern.EXAMPLES))(pattern.pattern)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = (
     "cmpdesign serve thumb.toml index.toml",
-    "cmpdesign serve thumb.toml --output markers --port 0",
+    "cmpdesign serve thumb.toml --output markers --port 0 --record run.mcap",
 )
 _LOOK_S = 0.2
 
@@ -39,6 +39,12 @@ def serve(
         int | None,
         typer.Option(min=0, max=65535, help="Port of the server; 0: any free port. [default: 8765]"),
     ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Also record all results, and gaps of the cameras, into this .mcap file."
+        ),
+    ] = None,
 ) -> None:
     """Run sensors and publish their newest results for Foxglove, on the topics of recordings.
 
@@ -47,9 +53,11 @@ def serve(
     """
     from cmpdesign.documents.runs import ServeDocument
     from cmpdesign.runtime.opening import open_sensor
-    from cmpdesign.runtime.serving import SensorServer
+    from cmpdesign.runtime.publish.serving import SensorServer
 
     with open_sensor(*sensors, outputs=output) as opened:
+        if record is not None:
+            opened.record(record)
         server = SensorServer(opened, port)
         try:
             if current_mode().as_json:

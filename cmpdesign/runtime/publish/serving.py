@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from threading import Event, Lock, Thread
 
-from cmpdesign.runtime.opening import Sensors
-from cmpdesign.runtime.publishing import SensorRecorder
+from cmpdesign.runtime.publish.results import SensorRecorder
 from cmpdesign.runtime.sensor import LateError, Sensor
 from cmpdesign.tracking.live.foxglove_server import FoxgloveServer
 from cmpdesign.tracking.live.options import Live
@@ -27,7 +27,8 @@ class SensorServer:
         address: for viewers.
     """
 
-    def __init__(self, sensors: Sensors, port: int | None = None) -> None:
+    def __init__(self, sensors: Iterable[Sensor], port: int | None = None) -> None:
+        sensors = tuple(sensors)
         contacts = {one.name: one.plan.contact is not None for one in sensors}
         self._server, self._sending = FoxgloveServer(contacts, Live("foxglove", port).free_port()), Lock()
         self.address = self._server.address
