@@ -18,12 +18,10 @@ constexpr std::uint8_t MEASURED = 1;  // Status in extractor/result.py
 
 using Vector = std::array<double, 2>;
 
-// Four markers in a row: the edge in the middle, its middle and vector, the jump there, px, and the stated
-// variance of the jump, px^2, both axes.
+// Four markers in a row: the edge in the middle, its middle and vector, and the jump there, px.
 struct Gridline {
   Index edge;
   Vector middle, rise, jump;
-  double variance;
 };
 
 using Values = std::span<double>;
@@ -45,7 +43,7 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
   for (Index e = 0; e < topology.edges.size(); ++e) {
     const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
     if (!is_measured(a) || !is_measured(b)) continue;
-    Gridline line{e, {}, {}, {}, 0.0};
+    Gridline line{e, {}, {}, {}};
     for (int k = 0; k < 2; ++k) line.rise[k] = markers.xy_px(b, k) - markers.xy_px(a, k);
     lengths.push_back(length(line.rise[0], line.rise[1]));
     const Index before = topology.next_markers(e, 0), after = topology.next_markers(e, 1);
@@ -58,8 +56,6 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
       line.jump[k] = line.rise[k] - (markers.xy_px(after, k) - markers.xy_px(before, k)) / 3;
       by_u[k] += u * line.rise[k], by_v[k] += v * line.rise[k];
     }
-    const auto variance = [&](Index m) { return markers.cov_px2(m, 0, 0) + markers.cov_px2(m, 1, 1); };
-    line.variance = variance(a) + variance(b) + (variance(before) + variance(after)) / 9;
     found.push_back(line);
   }
   // Round and elliptical layouts have third differences themselves. These are mapped to the image, and taken
@@ -76,13 +72,12 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
 }
 
 // The length of the median jump of each strip along an axis, the later row or column less the earlier one,
-// beyond the errors of its markers.
-Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, double edge,
+// beyond `disagreement` times the squared distance of its gridlines' jumps from that.
+Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, double edge, double disagreement,
                              const JumpLimits& limits) {
   struct Crossing {
     std::size_t strip;
     Vector jump;
-    double variance;
   };
   std::vector<Crossing> crossings;
   std::vector<std::size_t> end;  // of each strip's crossings, sorted by strips
@@ -93,24 +88,29 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
     if (strip >= end.size()) end.resize(strip + 1);
     ++end[strip];
     const auto jump = [&](int k) { return std::clamp(std::copysign(1.0, rise) * line.jump[k], -edge, edge); };
-    crossings.push_back({strip, {jump(0), jump(1)}, line.variance});
+    crossings.push_back({strip, {jump(0), jump(1)}});
   }
   std::partial_sum(end.begin(), end.end(), end.begin());
   std::vector<std::size_t> next(end);
-  std::vector<double> x(crossings.size()), y(crossings.size()), variance(crossings.size());
+  std::vector<double> x(crossings.size()), y(crossings.size());
   for (const Crossing& one : crossings) {
     const std::size_t at = --next[one.strip];
-    x[at] = one.jump[0], y[at] = one.jump[1], variance[at] = one.variance;
+    x[at] = one.jump[0], y[at] = one.jump[1];
   }
   Array<double, 1> jump({static_cast<Index>(end.size())}, std::numeric_limits<double>::quiet_NaN());
   for (std::size_t s = 0; s < end.size(); ++s) {
     const std::size_t count = end[s] - next[s];
     if (static_cast<Index>(count) < limits.min_gridlines) continue;
-    const auto median_of = [&](std::vector<double>& values) {
-      return median(Values(values).subspan(next[s], count));
-    };
-    const double dx = median_of(x), dy = median_of(y);
-    const double beyond = dx * dx + dy * dy - limits.common_error * median_of(variance);
+    std::vector<double> apart(count);
+    for (std::size_t i = 0; i < count; ++i) apart[i] = x[next[s] + i];
+    const double dx = median(apart);
+    for (std::size_t i = 0; i < count; ++i) apart[i] = y[next[s] + i];
+    const double dy = median(apart);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double from_x = x[next[s] + i] - dx, from_y = y[next[s] + i] - dy;
+      apart[i] = from_x * from_x + from_y * from_y;
+    }
+    const double beyond = dx * dx + dy * dy - disagreement * median(apart);
     jump[static_cast<Index>(s)] = std::sqrt(std::max(beyond, 0.0));
   }
   return jump;
@@ -125,7 +125,8 @@ StripJumps measure_jumps(const LocatedMarkers& markers, const layout::Topology& 
   if (static_cast<Index>(lengths.size()) < limits.min_gridlines)
     return {0.0, Array<double, 1>({0}), Array<double, 1>({0})};
   const double edge = median(lengths);
-  return {edge, jumps_along(lines, 1, edge, limits), jumps_along(lines, 0, edge, limits)};
+  return {edge, jumps_along(lines, 1, edge, limits.disagreement, limits),
+          jumps_along(lines, 0, edge, 0.0, limits)};
 }
 
 }  // namespace cmp::complete
