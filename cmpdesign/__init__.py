@@ -35,21 +35,22 @@ if TYPE_CHECKING:
 
     from cmpdesign.api.calibration import calibrate_camera as calibrate_camera
     from cmpdesign.api.calibration import calibrate_check as calibrate_check
+    from cmpdesign.api.calibration import calibrate_pattern as calibrate_pattern
     from cmpdesign.api.calibration import calibrate_rig as calibrate_rig
     from cmpdesign.api.datasets import dataset as dataset
     from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
-    from cmpdesign.api.designs import build as build
-    from cmpdesign.api.designs import check as check
-    from cmpdesign.api.designs import init as init
     from cmpdesign.api.designs import load as load
-    from cmpdesign.api.designs import schema as schema
-    from cmpdesign.api.designs import templates as templates
     from cmpdesign.api.force import calibrate_force as calibrate_force
     from cmpdesign.api.force import calibrate_gel as calibrate_gel
     from cmpdesign.api.layouts import Layout as Layout
     from cmpdesign.api.layouts import build_layout as build_layout
     from cmpdesign.api.layouts import read_layout as read_layout
+    from cmpdesign.api.making import build as build
+    from cmpdesign.api.making import check as check
+    from cmpdesign.api.making import init as init
+    from cmpdesign.api.making import schema as schema
+    from cmpdesign.api.making import templates as templates
     from cmpdesign.api.pictures import Verifier as Verifier
     from cmpdesign.api.pictures import load_scene as load_scene
     from cmpdesign.api.pictures import render as render
@@ -65,7 +66,6 @@ if TYPE_CHECKING:
     from cmpdesign.api.sequences import reconstruct as reconstruct
     from cmpdesign.api.sequences import recover_run as recover_run
     from cmpdesign.api.sequences import track as track
-    from cmpdesign.api.workshop import calibrate_pattern as calibrate_pattern
     from cmpdesign.api.workshop import evaluate as evaluate
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
@@ -114,23 +114,23 @@ _HOMES = {
     "TouchedError": "cmpdesign.runtime.zero",
     "TrackOptions": "cmpdesign.tracking.jobs.options",
     "Verifier": "cmpdesign.api.pictures",
-    "build": "cmpdesign.api.designs",
+    "build": "cmpdesign.api.making",
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
     "calibrate_check": "cmpdesign.api.calibration",
     "calibrate_force": "cmpdesign.api.force",
     "calibrate_gel": "cmpdesign.api.force",
-    "calibrate_pattern": "cmpdesign.api.workshop",
+    "calibrate_pattern": "cmpdesign.api.calibration",
     "calibrate_rig": "cmpdesign.api.calibration",
     "cameras": "cmpdesign.api.sequences",
-    "check": "cmpdesign.api.designs",
+    "check": "cmpdesign.api.making",
     "check_design": "cmpdesign.layout.checks",
     "dataset": "cmpdesign.api.datasets",
     "evaluate": "cmpdesign.api.workshop",
     "export_lerobot": "cmpdesign.api.workshop",
     "export_zarr": "cmpdesign.api.workshop",
     "extract": "cmpdesign.api.datasets",
-    "init": "cmpdesign.api.designs",
+    "init": "cmpdesign.api.making",
     "kerf": "cmpdesign.api.workshop",
     "laser_grid": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
@@ -148,9 +148,9 @@ _HOMES = {
     "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
     "render_sequence": "cmpdesign.api.pictures",
-    "schema": "cmpdesign.api.designs",
+    "schema": "cmpdesign.api.making",
     "size": "cmpdesign.proposal.camera_design",
-    "templates": "cmpdesign.api.designs",
+    "templates": "cmpdesign.api.making",
     "track": "cmpdesign.api.sequences",
     "verify": "cmpdesign.api.pictures",
     "write_layout": "cmpdesign.files.layout_json",

@@ -34,7 +34,7 @@ from extractor.errors import LayoutError
 from extractor.image.input import Channels, convert_to_bgr
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response, light_of_values, response_tables
-from extractor.layout.lattice_tables import Lattice, lattice_of
+from extractor.layout.lattice_tables import Lattice, cells_between_whites, lattice_of
 from extractor.layout.layout_file import LayoutLike, layouts_of
 from extractor.layout.reference import Reference
 from extractor.layout.topology import Topology, topology_of
@@ -54,9 +54,14 @@ from extractor.result import Markers, Origin, Reason
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
 EQUILATERAL_AREA = math.sqrt(3.0) / 4.0  # over the square of the side
+# The same of coded pads. Derived: regions over the least channel are 6 % smaller than regions in one channel.
+MIN_CODED_LEVEL_EDGE_PX = 6.6
 MAX_HOLE_SHARE = 0.02  # of a lattice that is not looked at more closely; chosen
 MIN_GAIN = 1.1  # in linked cells, of a look that is followed by a closer one; chosen, for time
 MIN_HOLES = 5  # the same as a number: the white cell may hide its three neighbours. Chosen
+MAX_SMALL_HOLE_SHARE = (
+    0.25  # of a lattice with too small cells, that is looked at at a finer scale; chosen, for time
+)
 
 Result = TypeVar("Result")
 Side = Literal["designed", "front", "back", "either"]
@@ -83,9 +88,9 @@ class FoundCells(NamedTuple):
         areas = self.cells.area_px[self.walk.part >= 0]
         return math.sqrt(select(areas, len(areas) // 2) / EQUILATERAL_AREA) if len(areas) else 0.0
 
-    def is_small(self, view: PyramidLevel) -> bool:
-        """Whether the linked cells are too small for this reduced scale; also without any."""
-        return view.scale > 1 and self.side_px < MIN_LEVEL_EDGE_PX * view.scale
+    def is_small(self, view: PyramidLevel, least_edge_px: float) -> bool:
+        """Whether the linked cells are smaller, at this reduced scale, than the edge; also without any."""
+        return view.scale > 1 and self.side_px < least_edge_px * view.scale
 
 
 class NumberedCells(NamedTuple):
@@ -192,30 +197,11 @@ class _Pad:
         _ = self.refiner, self.sampled_cells
 
 
-class Extractor:
-    """Finds and numbers the markers of one layout, or of the pads of a family, in images. Can be pickled and copied.
-
-    >>> from extractor import Extractor
-    >>> markers = Extractor("layout.json").extract(image)  # doctest: +SKIP
-    >>> markers = Extractor(["left.json", "right.json"]).extract(image)  # doctest: +SKIP
-    >>> markers.code  # doctest: +SKIP
+class ImageReader:
+    """Reads the images of one layout or family stage by stage, for extractors and trackers.
 
     Args:
-        layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
-            a layout of cmpdesign. Or a list of these, a family: pads that differ in their codes alone. An image is of
-            one of them, and ``Markers.code`` says of which one.
-        preset: "balanced" or "accurate".
-        response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
-            of the light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
-        side: the side of the pattern that images show: "front", "back", or "designed": the side that the layout's
-            ``mirrored`` states. An image of the other side gives no markers, and a reason. "either": both sides are
-            read.
-        channels: the order of an image's colors: "bgr", as in OpenCV, or "rgb".
-
-    Raises:
-        LayoutError: the layout is not a triangular pattern, its file cannot be read, or layouts are no family.
-        TypeError: ``layout`` is of another type.
-        ValueError: no such preset, response, side or order of channels.
+        layout, preset, response, side, channels: see ``Extractor``.
     """
 
     def __init__(
@@ -239,7 +225,7 @@ class Extractor:
         ):
             if value not in allowed:
                 raise ValueError(f"{name} is {value!r}; give one of {', '.join(allowed)}")
-        self._options = preset, response, side, channels
+        self.options = preset, response, side, channels
         self._channels = channels
         self._mirrored = is_mirrored(layout, side)
         by_depth: dict[np.dtype[Any], Response] = {np.dtype(np.uint8): "srgb", np.dtype(np.uint16): "linear"}
@@ -251,37 +237,20 @@ class Extractor:
         lattices = [pad.lattice for pad in self._pads]
         self._registration = Registration(lattices, Palette(dict(layout.palette)), self._mirrored)
         self._cells = len(lattices[0].ink)
+        self._least_edge_px = MIN_LEVEL_EDGE_PX if layout.code is None else MIN_CODED_LEVEL_EDGE_PX
+        self._hidden_cells = 0 if layout.code is None else cells_between_whites(lattices[0])
         self._efforts = EFFORTS if layout.code is None else CODED_EFFORTS
         self._pads[0].prepare()
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A copy is made from layout and options; buffers are not copied."""
-        return type(self), (self.layouts, *self._options)
-
-    def layout_of(self, markers: Markers) -> Reference:
-        """The layout of the pad that markers are of; of a family without a numbered pad, the first one."""
-        return next((one for one in self.layouts if one.code and one.code.id == markers.code), self.layout)
-
-    def extract(self, image: NDArray[Any]) -> Markers:
-        """The markers in one image, found independently of other frames.
-
-        Args:
-            image: (H, W, 3) uint8, colors in the order of ``channels``; also uint16 of either byte order (scaled to 8
-                bits), with alpha (dropped) and grayscale (without color no marker is found; the reason is
-                ``NO_COLOR``). Need not be contiguous.
-
-        Raises:
-            ImageError: another dtype or shape, or a side below 16 px.
-        """
-        return self.read(image).markers
-
     def read(self, image: NDArray[Any]) -> ReadImage:
-        """``extract``, with the appearance that a tracker needs for the next image."""
+        """The markers in one image, with the appearance that a tracker needs for the next image."""
         stages = Stages()
-        bgr = stages.record("image", self.to_bgr(image))
-        if bgr is None:
+        return self.read_pyramid(self.pyramid(image, stages), stages)
+
+    def read_pyramid(self, pyramid: Pyramid | None, stages: Stages) -> ReadImage:
+        """``read`` of an image that is converted; None: without color."""
+        if pyramid is None:
             return ReadImage(no_markers(self.layout, Reason.NO_COLOR, stages), None)
-        pyramid = self.pyramid(bgr, image.dtype)
         found = self._number_cells(pyramid, stages)
         if isinstance(found, Unnumbered):
             quality = measure_quality_without_numbers(pyramid.level(1), found.edge_px)
@@ -297,13 +266,12 @@ class Extractor:
         numbered = NumberedMarkers(places, numbering.mirrored, numbering.origin, numbering.pad)
         return self.finish(pyramid, numbered, stages)
 
-    def to_bgr(self, image: NDArray[Any]) -> NDArray[np.uint8] | None:
-        """An image for ``extract`` as contiguous (H, W, 3) uint8 BGR, None without color; raises ``ImageError``."""
-        return convert_to_bgr(image, self._channels)
-
-    def pyramid(self, bgr: NDArray[np.uint8], depth: np.dtype[Any]) -> Pyramid:
-        """The image (H, W, 3) at several scales, with the response of images of a ``depth``, uint8 or uint16."""
-        return Pyramid(bgr, self._tables[depth.newbyteorder("=")])
+    def pyramid(self, image: NDArray[Any], stages: Stages | None = None) -> Pyramid | None:
+        """An image for ``Extractor.extract`` at several scales, None without color; raises ``ImageError``."""
+        bgr = convert_to_bgr(image, self._channels)
+        if stages is not None:
+            stages.record("image", bgr)
+        return None if bgr is None else Pyramid(bgr, self._tables[image.dtype.newbyteorder("=")])
 
     def finish(
         self, pyramid: Pyramid, numbered: NumberedMarkers, stages: Stages, before: Appearance | None = None
@@ -370,9 +338,11 @@ class Extractor:
             found = self._find_cells(view, before.cells if before else None, effort, stages)
             gains = before is None or found.linked >= MIN_GAIN * before.linked
             before = found
-            if found.is_small(view):
+            if found.is_small(view, self._least_edge_px):
+                if self._is_whole(found, MAX_SMALL_HOLE_SHARE):
+                    break
                 continue
-            if gains and effort is not EFFORTS[-1] and not self._is_whole(found):
+            if gains and effort is not self._efforts[-1] and not self._is_whole(found):
                 skipped.append(found)
             else:
                 yield found
@@ -394,11 +364,70 @@ class Extractor:
         pixels = view.image.shape[0] * view.image.shape[1] * view.scale**2
         return math.sqrt(pixels / (2.0 * self._cells) * 4.0 / math.sqrt(3.0))
 
-    def _is_whole(self, found: FoundCells) -> bool:
-        """Whether the cells of an image are all found, as far as the cells themselves show it."""
+    def _is_whole(self, found: FoundCells, hole_share: float = MAX_HOLE_SHARE) -> bool:
+        """Whether the cells of an image are all found but a share, as far as the cells themselves show it."""
         return found.linked >= self._registration.min_cells and found.walk.holes <= max(
-            MAX_HOLE_SHARE * found.linked, MIN_HOLES
+            hole_share * found.linked + self._hidden_cells, MIN_HOLES
         )
+
+
+class Extractor:
+    """Finds and numbers the markers of one layout, or of the pads of a family, in images. Can be pickled and copied.
+
+    >>> from extractor import Extractor
+    >>> markers = Extractor("layout.json").extract(image)  # doctest: +SKIP
+    >>> markers = Extractor(["left.json", "right.json"]).extract(image)  # doctest: +SKIP
+    >>> markers.code  # doctest: +SKIP
+
+    Args:
+        layout: a triangular pattern: the path of its layout.json, a ``Reference``, the JSON object of a layout file, or
+            a layout of cmpdesign. Or a list of these, a family: pads that differ in their codes alone. An image is of
+            one of them, and ``Markers.code`` says of which one.
+        preset: "balanced" or "accurate".
+        response: relation of light and values: "srgb", "linear", an exponent (light is value ** exponent), or a table
+            of the light of all 256 values. None: 8-bit images are sRGB, 16-bit images are linear.
+        side: the side of the pattern that images show: "front", "back", or "designed": the side that the layout's
+            ``mirrored`` states. An image of the other side gives no markers, and a reason. "either": both sides are
+            read.
+        channels: the order of an image's colors: "bgr", as in OpenCV, or "rgb".
+
+    Raises:
+        LayoutError: the layout is not a triangular pattern, its file cannot be read, or layouts are no family.
+        TypeError: ``layout`` is of another type.
+        ValueError: no such preset, response, side or order of channels.
+    """
+
+    def __init__(
+        self,
+        layout: LayoutLike | Sequence[LayoutLike],
+        preset: Preset = "balanced",
+        response: Response | None = None,
+        side: Side = "designed",
+        channels: Channels = "bgr",
+    ) -> None:
+        self._reader = ImageReader(layout, preset, response, side, channels)
+        self.layouts, self.layout = self._reader.layouts, self._reader.layout
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is made from layout and options; buffers are not copied."""
+        return type(self), (self.layouts, *self._reader.options)
+
+    def layout_of(self, markers: Markers) -> Reference:
+        """The layout of the pad that markers are of; of a family without a numbered pad, the first one."""
+        return next((one for one in self.layouts if one.code and one.code.id == markers.code), self.layout)
+
+    def extract(self, image: NDArray[Any]) -> Markers:
+        """The markers in one image, found independently of other frames.
+
+        Args:
+            image: (H, W, 3) uint8, colors in the order of ``channels``; also uint16 of either byte order (scaled to 8
+                bits), with alpha (dropped) and grayscale (without color no marker is found; the reason is
+                ``NO_COLOR``). Need not be contiguous.
+
+        Raises:
+            ImageError: another dtype or shape, or a side below 16 px.
+        """
+        return self._reader.read(image).markers
 
 
 def _recognition_scales(size: tuple[int, int]) -> list[int]:

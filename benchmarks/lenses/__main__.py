@@ -67,7 +67,7 @@ def calibrate_one(condition: str, seed: int, number: int, chessboards: bool) -> 
     layout = standard_layout(layers=10)
     pictures = take_pictures(camera, layout, PICTURES, taken, rng)
     begin = time.process_time()
-    found = cmpdesign.calibrate_camera(layout, pictures).calibration
+    found = cmpdesign.calibrate_camera(layout, pictures).found
     cpu_s = time.process_time() - begin
     true = to_view(camera.pinhole)
     refused = {number for number, one in enumerate(found.pictures) if not one.used}

@@ -36,6 +36,7 @@ from cmpdesign.scene import (
 )
 from extractor import Extractor, parse_layout
 from extractor.layout.reference import Reference
+from extractor.pipeline import ImageReader
 
 PATTERNS = ("honeycomb", "round", "elliptical")
 SEEDS = (1, 2, 3)
@@ -107,6 +108,7 @@ def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount
         layout = standard_layout(pattern, LAYERS)
         reference = parse_layout(layout_to_json(layout))
         extractor, lattice = Extractor(reference), article_lattice(reference)
+        reader = ImageReader(reference)
         colored = np.flatnonzero(reference.cell_color < 3)
         for seed in SEEDS:
             scene = Scene(
@@ -121,7 +123,9 @@ def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount
             )
             rendered = render(scene)
             image, truth = np.asarray(rendered.image, np.uint8), rendered.truth
-            view = extractor.pyramid(np.ascontiguousarray(image), image.dtype).level(1)
+            pyramid = reader.pyramid(image)
+            assert pyramid is not None
+            view = pyramid.level(1)
             triangles = fit_plain_triangles(grow_from_hues(view, dict(reference.palette)))
             numbering = article_number(image, triangles, connect_corners(triangles), lattice)
             found = np.full(len(triangles.ink), -1) if numbering is None else numbering.cell_of_triangle

@@ -1,18 +1,17 @@
-"""Calibrations of one sensor: ``calibrate camera``, ``calibrate rig`` and ``calibrate check`` of the command line."""
+"""Calibrations of one sensor: ``calibrate camera``, ``pattern``, ``rig`` and ``check`` of the command line."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from cmpdesign.api.layouts import reference_from
-from cmpdesign.api.workshop import read_pictures
 from cmpdesign.errors import CmpDesignError, parameter
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MOST_PIXELS, require_suffix
+from cmpdesign.inputs.options import Preset, Response, Side, Written
 from cmpdesign.watch import tell
 
 if TYPE_CHECKING:
@@ -21,67 +20,55 @@ if TYPE_CHECKING:
     from cmpdesign.calibration.camera import CameraCalibration
     from cmpdesign.calibration.rig.calibration import RigCalibration
     from cmpdesign.calibration.rig.check import SensorCheck
+    from cmpdesign.documents.calibration import (
+        CalibrateCameraDocument,
+        CalibrateCheckDocument,
+        CalibrateRigDocument,
+    )
+    from cmpdesign.documents.reading import CalibratePatternDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.sensor.sensor_file import SensorFile
-    from extractor import LayoutLike, Markers, Reference, Rig, Side
-    from extractor.presets import Preset
+    from extractor import LayoutLike, LearntLayout, Markers, Reference, Rig
 
-Response = Literal["srgb", "linear"] | float
-
-
-@dataclass(frozen=True, eq=False)
-class CalibratedCamera:
-    """The result of ``calibrate_camera``.
-
-    Attributes:
-        calibration: the camera, its covariance, the verdicts on the pictures.
-        response: relation of light and values with which the pictures were read.
-        unread: picture -> reason, of the pictures that show no sheet.
-        written: the files.
-    """
-
-    calibration: CameraCalibration
-    response: Response
-    unread: dict[str, str]
-    written: tuple[Path, ...] = ()
+MOST_WAY_MM = 100  # of a step
 
 
 def calibrate_camera(
     layout: LayoutLike | AnyLayout,
     images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
-    output: str | Path | None = None,
+    output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,
     preset: Preset = "balanced",
     response: Response | None = None,
     max_pixels: int = MOST_PIXELS,
-) -> CalibratedCamera:
-    """Calibrate a camera from pictures of a flat sheet with the pattern, as the command ``calibrate camera`` does.
+) -> CalibrateCameraDocument:
+    """Calibrate a camera: focal lengths, principal point, distortion, with covariances. Take pictures at many tilts.
 
     >>> camera = cmpdesign.calibrate_camera("layout.json", "sheet/", "camera.toml")
-    >>> camera.calibration.camera.focal_px, camera.calibration.ray_px
+    >>> camera.parameters, camera.ray_px, camera.found.cov
 
     Args:
-        layout: the sheet's layout: a layout, the path of a layout file, a ``Reference``, or its JSON object.
-        images: 3 or more color pictures, better 15: files, folders of files, patterns such as "sheet/*.png", or arrays
-            (H, W, 3) BGR.
-        output: TOML file to write; OpenCV's and ROS' YAML files and a picture are written beside the file. None: none.
-        preset: see ``extractor.Extractor``.
-        response: relation of light and values; None: the one under which the pictures agree best.
-        max_pixels: largest image that is read, width x height.
+        layout: the layout.json of the sheet; or a layout, a ``Reference``, the JSON object of a layout file.
+        images: 3 or more color pictures of one flat sheet, better 15, folders, or patterns such as "sheet/*.png"; or
+            arrays (H, W, 3) BGR.
+        output: camera file to write: .toml, with .opencv.yaml, .ros.yaml and .png beside the file; None: none.
+        preset, max_pixels: see ``SequenceOptions``.
+        response: response of the camera; with an exponent, light is value ** exponent; None: the one under which the
+            pictures agree best.
 
     Raises:
         CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures from which no camera follows.
         OutputError: a file cannot be written.
     """
+    from cmpdesign.api.layouts import reference_from
     from cmpdesign.calibration.camera import calibrate_points
     from cmpdesign.calibration.pictures import SheetPictures, read_sheets
     from cmpdesign.calibration.response import likely_response
+    from cmpdesign.documents.calibration import CalibrateCameraDocument
     from extractor import Extractor
 
-    if output is not None and Path(output).suffix.lower() != ".toml":
-        raise CmpDesignError(f"{output}: unknown ending of a camera file; expected .toml")
-    given = [images] if isinstance(images, str | Path) else images
-    names, pictures = read_pictures(given, max_pixels)
+    require_suffix("output", output, ".toml")
+    names, pictures = read_pictures(images, max_pixels)
     reference = reference_from(layout)
 
     def read(one: Response | None, wanted: Sequence[str] | None = None) -> SheetPictures:
@@ -101,36 +88,143 @@ def calibrate_camera(
     used: Response = response or "srgb"
     if response is None and all(picture.dtype.itemsize == 1 for picture in pictures):
         used, calibration = likely_response(calibration, read)
-    result = CalibratedCamera(calibration, used, found.unread)
-    return result if output is None else _written(result, Path(output), names)
+    written = () if output is None else _write_camera(calibration, used, Path(output), names)
+    return CalibrateCameraDocument.of(
+        calibration, written=written, response=used, **_camera_figures(calibration, found.unread)
+    )
+
+
+def _camera_figures(found: CameraCalibration, unread: Mapping[str, str]) -> dict[str, Any]:
+    """The fields of ``CalibrateCameraDocument`` that describe the camera and its pictures."""
+    view, names = found.camera, found.model.names
+    values = view.focal_px + view.centre_px + view.distortion
+    pictures = [
+        {"picture": one.name, "points": one.points, "rms_px": one.rms_px, "cause": one.cause}
+        for one in found.pictures
+    ]
+    pictures += [
+        {"picture": name, "points": 0, "rms_px": None, "cause": f"not read: {reason}"}
+        for name, reason in unread.items()
+    ]
+    return {
+        "size_px": found.adjusted.problem.size_px,
+        "model": found.model.name,
+        "parameters": dict(zip(names, values, strict=True)),
+        "deviations": dict(zip(names, map(float, found.cov.diagonal() ** 0.5), strict=True)),
+        "held": found.held,
+        "rms_px": found.rms_px,
+        "scale": found.adjusted.base,
+        "ray_px": found.ray_px,
+        "sheet_bend_mm": found.bend_mm,
+        "further_view": found.advice.text,
+        "further_view_ray_px": found.advice.ray_px,
+        "pictures": pictures,
+    }
+
+
+def calibrate_pattern(
+    layout: LayoutLike | AnyLayout,
+    images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
+    output: Annotated[str | Path | None, Written(needed=True)] = None,
+    *,
+    preset: Preset = "accurate",
+    response: Response | None = None,
+    max_pixels: int = MOST_PIXELS,
+) -> CalibratePatternDocument:
+    """Measure the places of one pad's markers. Read the pad's pictures with the written layout.
+
+    >>> made = cmpdesign.calibrate_pattern("layout.json", "at_rest/", "made.json")
+    >>> extractor.Extractor("made.json")                  # reads this pad with its own places
+
+    Args:
+        layout: the pattern's nominal layout.json; or a layout, a ``Reference``, the JSON object of a layout file.
+        images: 10 or more color pictures of one pad at rest, folders, or patterns such as "rest/*.png"; or arrays
+            (H, W, 3) BGR.
+        output: layout file to write, with the measured places of the markers: .json; None: none.
+        preset, response, max_pixels: see ``SequenceOptions``.
+
+    Raises:
+        CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures from which no places follow.
+        OutputError: the layout file cannot be written.
+    """
+    from cmpdesign.api.layouts import reference_from
+    from cmpdesign.files.layout_json import write_layout
+    from cmpdesign.reading.read_layout import layout_from_reference
+    from extractor import learn_layout
+
+    require_suffix("output", output, ".json")
+    if (
+        output is not None
+        and isinstance(layout, str | Path)
+        and Path(output).resolve() == Path(layout).resolve()
+    ):
+        raise CmpDesignError(f"{output} is the nominal layout itself; give another name")
+    names, pictures = read_pictures(images, max_pixels)
+    learnt = learn_layout(
+        reference_from(layout),
+        pictures,
+        names=names,
+        watch=partial(tell, unit="pictures"),
+        preset=preset,
+        response=response,
+    )
+    if output is not None:
+        write_layout(layout_from_reference(learnt.layout), Path(output))
+    return _pattern_document(learnt, str(output or ""))
+
+
+def _pattern_document(learnt: LearntLayout, written: str) -> CalibratePatternDocument:
+    import numpy as np
+
+    from cmpdesign.documents.reading import CalibratePatternDocument
+
+    made, worst = learnt.layout.as_made, int(learnt.picture_z.argmax())
+    assert made is not None and made.covariance_mm2 is not None
+    variance = made.covariance_mm2[learnt.measured].trace(axis1=1, axis2=2) / 2
+    return CalibratePatternDocument.of(
+        learnt,
+        written=written,
+        pictures=len(learnt.picture_z),
+        side=made.side,
+        present=int(learnt.layout.present.sum()),
+        measured=int(learnt.measured.sum()),
+        residual_z=float(learnt.z),
+        worst_picture=worst,
+        worst_picture_z=float(learnt.picture_z[worst]),
+        worst_picture_rms_px=float(learnt.picture_rms_px[worst]),
+        scatter_mm=float(learnt.scatter_mm),
+        deviation_mm=float(np.sqrt(variance.mean())),
+    )
 
 
 def calibrate_rig(
     layout: LayoutLike | AnyLayout,
     rig: str | Path,
     rest: str | Path | Sequence[str | Path],
-    output: str | Path | None = None,
+    output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,
-    steps: Mapping[float, str | Path] | None = None,
-    step_sigma_mm: float = 0.002,
+    steps: Annotated[
+        Mapping[float, str | Path] | None,
+        Written(name="--step", metavar="MM=PICTURE", example="0.5=plate.png"),
+    ] = None,
+    step_sigma_mm: Annotated[float, Written(metavar="MM", least=1e-6)] = 0.002,
     side: Side = "designed",
     max_pixels: int = MOST_PIXELS,
-) -> RigCalibration:
-    """Calibrate a sensor's views, window and gel from its pad at rest, as the command ``calibrate rig`` does.
+) -> CalibrateRigDocument:
+    """Calibrate the views, the window and the gel of a sensor. What remains undetermined is stated and named.
 
     >>> found = cmpdesign.calibrate_rig("layout.json", "measured.toml", ["rest.png"], "sensor.toml")
     >>> found.held, found.depth_share
 
     Args:
-        layout: the pad's layout: a layout, the path of a layout file, a ``Reference``, or its JSON object.
-        rig: rig or sensor file: lenses, the measured [medium] and its [medium_deviation], and where it is known the
+        layout: the pad's layout.json; or a layout, a ``Reference``, the JSON object of a layout file.
+        rig: rig or sensor file with lenses and the measured [medium], [medium_deviation], and where it is known the
             camera's [calibration.camera]. Poses in the file are not used.
-        rest: pictures of the pad at rest; of several cameras one for each view, joined by commas.
-        output: sensor file to write, beside ``rig``; None: none.
-        steps: ways of a flat plate that presses the pattern, mm -> picture.
-        step_sigma_mm: standard deviation of a way.
-        side: see ``extractor.Extractor``.
-        max_pixels: largest image that is read, width x height.
+        rest: pictures of the pad at rest; of several cameras one each, joined by commas.
+        output: sensor file to write, beside ``rig``: .toml; None: none.
+        steps: a flat plate has pressed the pattern by MM; give two or more; or a mapping, mm -> picture.
+        step_sigma_mm: standard deviation of the way of a step.
+        side, max_pixels: see ``SequenceOptions``.
 
     Raises:
         CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures from which no rig follows.
@@ -138,14 +232,19 @@ def calibrate_rig(
     """
     import numpy as np
 
+    from cmpdesign.api.layouts import reference_from
     from cmpdesign.calibration.rig.calibration import calibrate_rig_markers
     from cmpdesign.sensor.sensor_file import load_sensor_file
 
+    ways = dict(steps or {})
+    for way_mm in ways:
+        if not -MOST_WAY_MM <= way_mm <= MOST_WAY_MM:
+            raise CmpDesignError(f"{parameter('steps')}: a way of {way_mm:g} mm, limit {MOST_WAY_MM} mm")
+    require_suffix("output", output, ".toml")
     sensor, reference = load_sensor_file(rig), reference_from(layout)
     if output is not None:
         _require_beside(Path(rig), Path(output))
     given = [rest] if isinstance(rest, str | Path) else list(rest)
-    ways = dict(steps or {})
     names = [*map(str, given), *map(str, ways.values())]
     found = _read_views(sensor, reference, sensor.rig.without_poses(), names, side, max_pixels)
     camera = sensor.table.calibration.camera
@@ -164,30 +263,64 @@ def calibrate_rig(
         dated = [name for whole in names[: len(given)] for name in whole.split(",")]
         text = calibrated_text(sensor, calibration, len(given), tuple(ways), _date_of(dated))
         write_file(Path(output), text)
-    return calibration
+    return _rig_document(calibration, str(output or ""), len(given), tuple(ways))
+
+
+def _rig_document(
+    found: RigCalibration, written: str, pictures: int, steps_mm: tuple[float, ...]
+) -> CalibrateRigDocument:
+    from cmpdesign.documents.calibration import CalibrateRigDocument
+
+    names = found.names[: len(found.values)]
+    mirrors = [
+        {
+            "views": pair.views,
+            "normals": tuple(tuple(plane.normal.tolist()) for plane in pair.planes),
+            "distances_mm": tuple(plane.distance_mm for plane in pair.planes),
+            "angle_deg": pair.angle_deg,
+            "shift_mm": pair.shift_mm,
+        }
+        for pair in found.mirrors
+    ]
+    return CalibrateRigDocument.of(
+        found,
+        written=written,
+        pictures=pictures,
+        steps_mm=steps_mm,
+        plate_markers=found.plate_markers,
+        parameters=dict(zip(names, found.values.tolist(), strict=True)),
+        stated=dict(zip(names, found.stated.tolist(), strict=True)),
+        deviations=dict(zip(found.names, found.deviations.tolist(), strict=True)),
+        held=found.held,
+        rms_px=found.rms_px,
+        scale=found.scale,
+        depth_share=found.depth_share,
+        mirrors=mirrors,
+    )
 
 
 def calibrate_check(
     sensor: str | Path,
-    images: str | Path | Sequence[str | Path],
+    images: Annotated[str | Path | Sequence[str | Path], Written(metavar="REST")],
     *,
     layout: LayoutLike | AnyLayout | None = None,
     max_pixels: int = MOST_PIXELS,
-) -> SensorCheck:
-    """Compare pictures of a sensor's pad at rest with its calibration, as the command ``calibrate check`` does.
+) -> CalibrateCheckDocument:
+    """Check a sensor's calibration by its pad at rest. If it does not hold, the cause and the step to repeat are named.
 
     >>> found = cmpdesign.calibrate_check("sensor.toml", ["today.png"])
-    >>> found.holds, found.misfit, found.likely, found.steps
+    >>> found.holds, found.misfit, [one.cause for one in found.causes if one.likely], found.steps
 
     Args:
-        sensor: the sensor file that ``calibrate rig`` wrote.
-        images: pictures of the pad at rest; of several cameras one for each view, joined by commas.
+        sensor: sensor file that calibrate rig wrote; it names its layout.
+        images: pictures of the pad at rest; of several cameras one each, joined by commas.
         layout: the pad's layout; None: the one that the file names.
-        max_pixels: largest image that is read, width x height.
+        max_pixels: see ``SequenceOptions``.
 
     Raises:
         CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures that show no pattern.
     """
+    from cmpdesign.api.layouts import reference_from
     from cmpdesign.calibration.rig.check import check_markers
     from cmpdesign.sensor.sensor_file import load_sensor_file
 
@@ -203,7 +336,7 @@ def calibrate_check(
     found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
     before = file.table.calibration.rig
     stated = before.rms_px if before is not None and len(before.rms_px) == len(file.rig.views) else ()
-    return check_markers(
+    checked = check_markers(
         reference,
         file.rig,
         found,
@@ -211,11 +344,36 @@ def calibrate_check(
         scale=before.scale if before is not None else 1.0,
         limit_px=file.table.limits.max_rest_error_px,
     )
+    return _check_document(checked, names)
+
+
+def _check_document(found: SensorCheck, names: Sequence[str]) -> CalibrateCheckDocument:
+    from cmpdesign.documents.calibration import CalibrateCheckDocument
+
+    causes = [
+        {
+            "cause": one.cause,
+            "left": one.left,
+            "changes": dict(one.changes),
+            "likely": one.cause in found.likely,
+        }
+        for one in found.causes
+    ]
+    return CalibrateCheckDocument.of(
+        found,
+        holds=found.holds,
+        misfit=found.misfit,
+        picture_misfits=dict(zip(names, found.picture_misfits, strict=True)),
+        rms_px=dict(found.rms_px),
+        stated_px=dict(found.stated_px),
+        limit_px=found.limit_px,
+        causes=causes,
+        steps=found.steps,
+        depth_error=found.depth_error if isfinite(found.depth_error) else None,
+    )
 
 
 def _require_beside(rig: Path, output: Path) -> None:
-    if output.suffix.lower() != ".toml":
-        raise CmpDesignError(f"{output}: unknown ending of a sensor file; expected .toml")
     if output.resolve() == rig.resolve():
         raise CmpDesignError(
             f"{output} is RIG itself, whose measured values a further calibration needs; choose another name"
@@ -256,22 +414,43 @@ def _read_views(
     return out
 
 
-def _written(result: CalibratedCamera, output: Path, names: Sequence[str]) -> CalibratedCamera:
+def _write_camera(
+    found: CameraCalibration, response: Response, output: Path, names: Sequence[str]
+) -> tuple[str, ...]:
     from cmpdesign.calibration.outputs.camera_files import camera_toml, opencv_yaml, ros_yaml
     from cmpdesign.calibration.outputs.ray_picture import ray_picture
     from cmpdesign.files.atomic import write_file
     from cmpdesign.files.images import to_png
 
-    found = result.calibration
     contents: dict[Path, str | bytes] = {
-        output: camera_toml(found, result.response, _date_of(names)),
+        output: camera_toml(found, response, _date_of(names)),
         output.with_suffix(".opencv.yaml"): opencv_yaml(found),
         output.with_suffix(".ros.yaml"): ros_yaml(found),
         output.with_suffix(".png"): to_png(ray_picture(found)),
     }
     for path, content in contents.items():
         write_file(path, content)
-    return CalibratedCamera(found, result.response, result.unread, tuple(contents))
+    return tuple(map(str, contents))
+
+
+def read_pictures(
+    images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]], max_pixels: int
+) -> tuple[list[str], list[NDArray[Any]]]:
+    """The names and the pixels of pictures; a folder or a pattern stands for its pictures."""
+    from cmpdesign.files.images import read_image
+    from cmpdesign.inputs.sources import picture_paths
+
+    names: list[str] = []
+    pictures: list[NDArray[Any]] = []
+    for image in [images] if isinstance(images, str | Path) else images:
+        if not isinstance(image, str | Path):
+            names.append(f"picture {len(names) + 1}")
+            pictures.append(image)
+            continue
+        for path in picture_paths([str(image)]):
+            names.append(str(path))
+            pictures.append(read_image(path, max_pixels))
+    return names, pictures
 
 
 def _date_of(names: Sequence[str]) -> str | None:

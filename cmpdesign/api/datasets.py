@@ -4,99 +4,131 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, TypedDict, Unpack
 
-from cmpdesign.api.layouts import reference_from
+from cmpdesign.inputs.options import Channels, Preset, Response, Side, Usual, Written, settled
 
 if TYPE_CHECKING:
-    from cmpdesign.data.reader import DataSet
+    from cmpdesign.data.folder import Progress
+    from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from extractor import LayoutLike
 
 
+class ReadingOptions(TypedDict, total=False):
+    """Options of ``extract``: how frames are read.
+
+    Keys:
+        preset, response, side, channels: see ``SequenceOptions``.
+    """
+
+    preset: Annotated[Preset, Usual("balanced")]
+    response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
+    side: Annotated[Side, Usual("designed")]
+    channels: Annotated[Channels, Usual("bgr")]
+
+
 def dataset(
     plan: str | Path,
-    output: str | Path,
+    output: Annotated[str | Path, Written(metavar="FOLDER", needed=False)],
     *,
-    shards: str | int | None = None,
-    scheduler: str = "local",
-    workers: int | None = None,
-    inputs_from: Sequence[str | Path] = (),
-) -> DataSet:
-    """Make a data set, as the command ``dataset`` does; the same call continues an interrupted data set.
+    shards: Annotated[str | int | None, Written(metavar="N|A:B")] = None,
+    scheduler: Annotated[str, Written(metavar="local|dask=ADDRESS")] = "local",
+    workers: Annotated[int | None, Written(least=1)] = None,
+    inputs_from: Annotated[Sequence[str | Path], Written(metavar="FOLDER")] = (),
+) -> DatasetDocument:
+    """Make a data set: pictures, truth, markers, forces and parameters of the frames that a plan names.
 
-    A program that calls this with the scheduler "local" needs ``if __name__ == "__main__":`` around its work, because
-    every worker is a new process.
+    The same call continues an interrupted data set. A program that calls this with the scheduler "local" needs
+    ``if __name__ == "__main__":`` around its work, because every worker is a new process.
 
-    >>> frames = cmpdesign.dataset("plan.toml", "pressed", shards=2)
+    >>> cmpdesign.dataset("plan.toml", "pressed", shards=2).frames
+    >>> frames = cmpdesign.data.load("pressed")
     >>> frames[0].image, frames[0].arrays["true_xy_px"], frames[0].values["force_n"]
 
     Args:
         plan: a TOML file, or the name of a plan template.
-        output: a new folder, or the folder of a data set of the same plan.
-        shards: the first N shards, or "A:B", the shards from A to below B; None: all.
-        scheduler: "local", or "dask=ADDRESS", the address of a dask scheduler or its scheduler file.
-        workers: processes on this machine; None: one for each core.
-        inputs_from: folders, beside the plan's own, whose height maps and pictures the plan may name. These files
-            become a part of the data set.
-
-    Returns:
-        The finished shards, see ``cmpdesign.data.load``; ``cmpdesign.data.check`` compares all files with their
-        digests.
+        output: data set: a new folder, or one of the same plan.
+        shards: only the first N shards, or those from A to below B; None: all.
+        scheduler: the machine that works: "local", this machine, or a dask scheduler by address or scheduler file.
+        workers: number of processes on this machine; None: one for each core.
+        inputs_from: folder, beside the plan's, whose pictures and height maps the plan may take; they become a part of
+            the data set.
 
     Raises:
         CmpDesignError: the plan cannot be carried out, or workers were lost.
         OutputError: a file cannot be written; finished shards are kept.
     """
-    from cmpdesign.data import load
     from cmpdesign.data.run import make_dataset, parse_shards
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.design.templates import find_plan
 
     where = parse_scheduler(scheduler, workers)
-    make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from)
-    return load(output)
+    return _document(output, make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from))
 
 
 def extract(
     layout: LayoutLike | AnyLayout,
     sources: str | Path | Sequence[str | Path],
-    output: str | Path,
+    output: Annotated[str | Path, Written(metavar="FOLDER")],
     *,
-    frames_a_shard: int = 1000,
-    scheduler: str = "local",
-    workers: int | None = None,
-    **reading: Any,
-) -> DataSet:
-    """Read the markers of every frame of many sources, as the command ``extract`` does; see also ``dataset``.
+    frames_a_shard: Annotated[int, Written(least=1)] = 1000,
+    scheduler: Annotated[str, Written(metavar="local|dask=ADDRESS")] = "local",
+    workers: Annotated[int | None, Written(least=1)] = None,
+    **reading: Unpack[ReadingOptions],
+) -> DatasetDocument:
+    """Read the markers of every frame of many sources into Parquet files, each frame independently of the others.
 
-    >>> run = cmpdesign.extract("layout.json", ["monday/*.mp4", "tuesday/*.mp4"], "markers")
-    >>> run.table(["source", "frame", "time_s", "xy_px"])
+    >>> cmpdesign.extract("layout.json", ["monday/*.mp4", "tuesday/*.mp4"], "markers")
+    >>> cmpdesign.data.load("markers").table(["source", "frame", "time_s", "xy_px"])
 
     Args:
-        layout: see ``track``.
-        sources: videos, folders of pictures, patterns such as "run*/*.mp4"; each frame is read independently.
-        output: a new folder, or the folder of a data set of the same sources.
-        frames_a_shard: number of frames in a shard; a video is cut at the next key frame.
+        layout: the pattern's layout.json; or a layout, a ``Reference``, the JSON object of a layout file.
+        sources: videos, folders of pictures, patterns such as "run*/*.mp4".
+        output: data set: a new folder, or one of the same sources.
+        frames_a_shard: frames in a shard; a video is cut at the next key frame.
         scheduler, workers: see ``dataset``.
-        reading: preset, response, side, channels; see ``extractor.Extractor``.
+        reading: see ``ReadingOptions``.
 
     Raises:
         CmpDesignError, extractor.ExtractorError: a layout or a source that cannot be read, or workers were lost.
         OutputError: a file cannot be written; finished shards are kept.
     """
-    from cmpdesign.data import load
+    from cmpdesign.api.layouts import reference_from
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.data.videos.extraction import FrameReading
 
-    texts = [sources] if isinstance(sources, str | Path) else sources
-    extract_markers(
-        reference_from(layout),
-        [str(text) for text in texts],
-        output,
-        FrameReading(**reading),
-        parse_scheduler(scheduler, workers),
-        frames_a_shard,
+    texts = [str(text) for text in ([sources] if isinstance(sources, str | Path) else sources)]
+    how, where = FrameReading(**settled(ReadingOptions, reading)), parse_scheduler(scheduler, workers)
+    made = extract_markers(reference_from(layout), texts, output, how, where, frames_a_shard)
+    return _document(output, made)
+
+
+def check_dataset(folder: str | Path) -> DatasetCheckDocument:
+    """Compare all files of a data set with their digests, as ``dataset --check`` does."""
+    from cmpdesign.data import check
+    from cmpdesign.documents.data import DatasetCheckDocument
+
+    found = check(folder)
+    return DatasetCheckDocument(
+        folder=str(folder),
+        shards=found.shards,
+        of_shards=found.of_shards,
+        frames=found.frames,
+        bytes=found.bytes,
+        problems=list(found.problems),
     )
-    return load(output)
+
+
+def _document(folder: str | Path, made: Progress) -> DatasetDocument:
+    from cmpdesign.documents.data import DatasetDocument
+
+    return DatasetDocument(
+        written=str(folder),
+        frames=made.frames,
+        shards=made.shards,
+        of_shards=made.of_shards,
+        redrawn=made.redrawn,
+        bytes=made.bytes,
+    )

@@ -1,9 +1,9 @@
-"""Designs loaded, checked and written: ``templates``, ``check``, ``build`` and ``schema`` of the command line."""
+"""Designs for programs: loaded, changed, checked, written, shown in notebooks."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api.layouts import Layout, build_layout
 from cmpdesign.design.design import Design as Parameters
-from cmpdesign.design.design import design_schema, load_design
-from cmpdesign.errors import CmpDesignError, parameter
+from cmpdesign.design.design import load_design
+from cmpdesign.errors import CmpDesignError
 from cmpdesign.layout.checks import CAMERA_PX
 from cmpdesign.products.building import Built, Checked, build_files, check_products
 from cmpdesign.products.registry import USUAL_NAMES, chosen_products
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.designs import InitDocument
     from cmpdesign.layout.report import DesignReport
 
 
@@ -85,7 +84,7 @@ class Design(Parameters):
             camera: width and height in px of the camera whose picture the pattern fills.
             read: also draw and read the pads that laser, mold and print would make.
         """
-        return check_products(self, self.layout, _checked_camera(camera), read=read)
+        return check_products(self, self.layout, checked_camera(camera), read=read)
 
     def write(
         self,
@@ -106,7 +105,7 @@ class Design(Parameters):
             OutputError: a file cannot be written.
         """
         names = products if isinstance(products, str) else ",".join(products)
-        return build_files(self, self.layout, folder, chosen_products(names), _checked_camera(camera))
+        return build_files(self, self.layout, folder, chosen_products(names), checked_camera(camera))
 
     def __repr__(self) -> str:
         given = ", ".join(
@@ -160,113 +159,7 @@ def load(
     return Design.of(load_design(name_or_path, {**(overrides or {}), **changes}))
 
 
-def build(
-    design: str | Path | Parameters,
-    output: str | Path = "out",
-    *,
-    products: str | Iterable[str] = USUAL_NAMES,
-    camera: tuple[int, int] = CAMERA_PX,
-) -> Built:
-    """Write a design's files, as the command ``build`` does; see ``Design.write``.
-
-    >>> cmpdesign.build("tac3d", "mine").findings
-    """
-    return _design(design).write(output, products, camera)
-
-
-def check(
-    design: str | Path | Parameters, *, camera: tuple[int, int] = CAMERA_PX, read: bool = False
-) -> Checked:
-    """The features of a design that cannot be made or read, as the command ``check`` lists them."""
-    return _design(design).check(camera, read=read)
-
-
-def _design(given: str | Path | Parameters) -> Design:
-    return Design.of(given) if isinstance(given, Parameters) else load(given)
-
-
-def init(
-    name: str | Path,
-    *,
-    extends: str | None = None,
-    sensor: str | Path | None = None,
-    camera: Sequence[str | Path] = (),
-    force: bool = False,
-) -> InitDocument:
-    """Write a commented design file, or a sensor file, as the command ``init`` does.
-
-    >>> cmpdesign.init("mine").written
-    'mine.toml'
-
-    Args:
-        name: name of the design; NAME.toml is written. May name a folder.
-        extends: design to begin with: a template's name, or a path relative to the folder of ``name``; None: a
-            honeycomb of 10 layers.
-        sensor: layout file of a pad: a sensor file is written instead.
-        camera: files of ``calibrate_camera`` for the views of the sensor; the same one twice for two mirrors.
-        force: replace a file of this name.
-
-    Raises:
-        CmpDesignError: the file exists, or arguments that exclude each other.
-        OutputError: the file cannot be written.
-    """
-    from cmpdesign.design.commented_toml import commented_toml
-    from cmpdesign.design.extends import require_extended
-    from cmpdesign.documents.designs import InitDocument
-    from cmpdesign.files.atomic import write_file
-    from cmpdesign.inputs.files import path_exists
-
-    file = Path(name)
-    if not file.name:
-        raise CmpDesignError(f"{name} is a folder; give a design's name")
-    file = file if file.suffix == ".toml" else file.with_name(f"{file.name}.toml")
-    if path_exists(file) and not force:
-        raise CmpDesignError(
-            f"{file}: exists already; choose another name, or replace it with {parameter('force')}"
-        )
-    if sensor is not None or camera:
-        if sensor is None or not camera or extends is not None:
-            words = [parameter("sensor"), parameter("camera"), parameter("extends")]
-            raise CmpDesignError("a sensor file needs {} LAYOUT and {} FILE, and no {}".format(*words))
-        text = _sensor_text(file, Path(sensor), [Path(one) for one in camera])
-    else:
-        if extends is not None:
-            require_extended(extends, file)
-        text = commented_toml(extends)
-    write_file(file, text)
-    return InitDocument(written=str(file), extends=extends)
-
-
-def _sensor_text(file: Path, layout: Path, cameras: Sequence[Path]) -> str:
-    """The text of a sensor file for the pad of a layout."""
-    from cmpdesign.sensor.commented import relative_name, sensor_text
-    from cmpdesign.sensor.sensor_file import load_sensor_file, parse_sensor_file
-    from extractor import load_layout
-
-    load_layout(layout)
-    views = [load_sensor_file(one) for one in cameras]
-    text = sensor_text(file.stem, relative_name(layout, file.parent), views)
-    parse_sensor_file(text, str(file))
-    return text
-
-
-def schema() -> dict[str, Any]:
-    """The JSON Schema of a design's TOML file, for editors, as the command ``schema`` prints it."""
-    return design_schema()
-
-
-def templates() -> dict[str, Design]:
-    """The design templates by name, as the command ``templates`` lists them.
-
-    >>> templates()["tac3d"].layers
-    10
-    """
-    from cmpdesign.design import templates as shipped
-
-    return {name: load(name) for name in shipped.templates()}
-
-
-def _checked_camera(camera: tuple[int, int]) -> tuple[int, int]:
+def checked_camera(camera: tuple[int, int]) -> tuple[int, int]:
     """The camera's width and height.
 
     Raises:

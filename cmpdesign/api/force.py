@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from cmpdesign.api.layouts import reference_from
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.files import require_suffix
+from cmpdesign.inputs.options import Written
 
 if TYPE_CHECKING:
-    from cmpdesign.contact.force_scale import ForceScale
+    from cmpdesign.documents.reading import CalibrateForceDocument, CalibrateGelDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from extractor import LayoutLike
-    from extractor.contact import Gel
 
 
 def calibrate_gel(
     layout: LayoutLike | AnyLayout,
     rig: str | Path,
-    output: str | Path | None = None,
+    output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,
-    margin_mm: float = 0.0,
-) -> Gel:
-    """Make Green's matrix of a pad, with which forces are read, as the command ``calibrate gel`` does.
+    margin_mm: Annotated[float, Written(metavar="MM")] = 0.0,
+) -> CalibrateGelDocument:
+    """Compute a pad's elastic response once, so that forces can be read from its displacement.
 
-    >>> gel = cmpdesign.calibrate_gel("layout.json", "sensor.toml", "gel.npz")
+    >>> gel = cmpdesign.calibrate_gel("layout.json", "sensor.toml", "gel.npz").found
     >>> reader = extractor.contact.ContactReader("layout.json", gel, young_mpa=0.3)
 
     Args:
-        layout: the pad.
-        rig: TOML file with an [elastomer]: ``thickness_mm``, ``poisson``, ``marker_depth_mm``.
+        layout: the pad's layout.json; or a layout, a ``Reference``, the JSON object of a layout file.
+        rig: TOML file with [elastomer]: thickness_mm, poisson, marker_depth_mm.
         output: file to write: .npz; None: none.
         margin_mm: width of the gel beyond the layout's outline.
 
@@ -39,36 +39,50 @@ def calibrate_gel(
     """
     import io
 
+    from cmpdesign.api.layouts import reference_from
     from cmpdesign.contact.finite_block import make_gel
+    from cmpdesign.documents.reading import CalibrateGelDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.tracking.marker_depth import read_elastomer
 
-    if output is not None and Path(output).suffix.lower() != ".npz":
-        raise CmpDesignError(f"{output}: unknown ending of a gel's file; expected .npz")
+    require_suffix("output", output, ".npz")
     gel = make_gel(reference_from(layout), read_elastomer(Path(rig)), margin_mm=margin_mm)
     if output is not None:
         stream = io.BytesIO()
         gel.write(stream)
         write_file(Path(output), stream.getvalue())
-    return gel
+    return CalibrateGelDocument.of(
+        gel,
+        written=str(output or ""),
+        digest=gel.digest,
+        markers=len(gel.matrix) // 3,
+        loads=len(gel.loads_mm),
+        thickness_mm=gel.thickness_mm,
+        poisson=gel.poisson,
+        marker_depth_mm=gel.marker_depth_mm,
+        margin_mm=gel.margin_mm,
+    )
 
 
-def calibrate_force(run: str | Path, weights: str | Path) -> ForceScale:
-    """Fit Young's modulus to known weights, as the command ``calibrate force`` does.
+def calibrate_force(run: str | Path, weights: str | Path) -> CalibrateForceDocument:
+    """Fit Young's modulus and the force at rest to known weights, best on a ball.
 
     >>> cmpdesign.calibrate_force("run.npz", "weights.csv").young_mpa
 
     Args:
-        run: .npz file of ``reconstruct`` with ``contact``.
-        weights: CSV file with the columns ``frame`` and ``mass_g``: the mass that stood on the pad in a frame.
+        run: the .npz file of a reconstruction with contact.
+        weights: CSV file, columns frame and mass_g: 3 or more different weights, each on the pad in its frame.
 
     Raises:
         CmpDesignError: a file that cannot be read, a run without forces, or weights that do not determine the modulus.
     """
+    from dataclasses import asdict
+
     import numpy as np
 
     from cmpdesign.api.sequences import load_run
     from cmpdesign.contact.force_scale import fit_force_scale, parse_weights
+    from cmpdesign.documents.reading import CalibrateForceDocument
     from cmpdesign.files.npz import NpzError, read_npz
     from cmpdesign.inputs.files import read_text
     from extractor.contact import ContactReason
@@ -86,4 +100,5 @@ def calibrate_force(run: str | Path, weights: str | Path) -> ForceScale:
     at = np.searchsorted(arrays["frame"], known.frame)
     good = arrays["contact_reason"][at] == ContactReason.NONE
     force = np.where(good, -arrays["force_n"][at, 2], np.nan)
-    return fit_force_scale(known, force, arrays["force_cov_n2"][at, 5], float(arrays["young_mpa"]))
+    scale = fit_force_scale(known, force, arrays["force_cov_n2"][at, 5], float(arrays["young_mpa"]))
+    return CalibrateForceDocument(**asdict(scale))

@@ -6,22 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
-from cmpdesign.api.layouts import layout_from, reference_from
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written, settled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.products.sheet.verdict import SheetVerdict
+    from cmpdesign.reading.problem_report import ProblemReport
     from cmpdesign.reading.verify import Verdict
     from cmpdesign.scene import Rendered, Scene
     from cmpdesign.scene.files.scene_file import SceneFile
     from extractor import Extractor, LayoutLike, Reference
-    from extractor.presets import Preset
 
 SIZE_PX = (640, 480)
 
@@ -30,41 +30,28 @@ class ViewOptions(TypedDict, total=False):
     """The properties of a plain picture; the names are the names in scene files.
 
     Keys:
-        pitch_px: pixels from marker to marker; 20.
-        rotation_deg: counter-clockwise turn in the image; 0.
-        tilt_deg, tilt_axis_deg: tilt out of the image plane, and the direction of its axis; 0.
-        mirrored: the camera sees the back; None: as designed.
-        press_mm: largest displacement of the markers by a press at the centre; 0.
-        press_radius_mm: radius of the press; None: a quarter of the pattern.
-        blur_px: Gaussian blur, sigma; 1.
-        noise: standard deviation in 255ths; 0.
-        response: relation of light and values: "srgb", "linear", or the exponent of light = value ** exponent; "srgb".
+        pitch_px: pixels from marker to marker.
+        rotation_deg: counter-clockwise turn in the image, degrees.
+        tilt_deg: tilt out of the image plane, degrees.
+        tilt_axis_deg: direction of the tilt's axis, degrees.
+        mirrored: side of the pattern that the camera sees: the back or the front; None: as designed.
+        press_mm: largest displacement of the markers by a press at the centre, mm.
+        press_radius_mm: radius of the press, mm; None: a quarter of the pattern.
+        blur_px: Gaussian blur, sigma in pixels.
+        noise: noise, standard deviation in 255ths.
+        response: response of the camera; with an exponent, light is value ** exponent.
     """
 
-    pitch_px: float
-    rotation_deg: float
-    tilt_deg: float
-    tilt_axis_deg: float
-    mirrored: bool | None
-    press_mm: float
-    press_radius_mm: float | None
-    blur_px: float
-    noise: float
-    response: Literal["srgb", "linear"] | float
-
-
-_USUAL = ViewOptions(
-    pitch_px=20.0,
-    rotation_deg=0.0,
-    tilt_deg=0.0,
-    tilt_axis_deg=0.0,
-    mirrored=None,
-    press_mm=0.0,
-    press_radius_mm=None,
-    blur_px=1.0,
-    noise=0.0,
-    response="srgb",
-)
+    pitch_px: Annotated[float, Usual(20.0, name="--pitch")]
+    rotation_deg: Annotated[float, Usual(0.0, name="--rotation")]
+    tilt_deg: Annotated[float, Usual(0.0, name="--tilt")]
+    tilt_axis_deg: Annotated[float, Usual(0.0, name="--tilt-axis")]
+    mirrored: Annotated[bool | None, Usual(None, name="--mirrored/--front")]
+    press_mm: Annotated[float, Usual(0.0, name="--press")]
+    press_radius_mm: Annotated[float | None, Usual(None, name="--press-radius")]
+    blur_px: Annotated[float, Usual(1.0, name="--blur")]
+    noise: Annotated[float, Usual(0.0)]
+    response: Annotated[Response, Usual("srgb", metavar="srgb|linear|EXPONENT")]
 
 
 def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -> Scene:
@@ -79,12 +66,10 @@ def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[Vi
         SceneError: a value out of range; the message names it.
         TypeError: a name that ``ViewOptions`` does not have.
     """
+    from cmpdesign.api.layouts import layout_from
     from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
 
-    unknown = sorted(view.keys() - _USUAL.keys())
-    if unknown:
-        raise TypeError(f"{unknown[0]} is no property of a view; there are {', '.join(_USUAL)}")
-    pattern, chosen = layout_from(layout), ViewOptions(**{**_USUAL, **view})
+    pattern, chosen = layout_from(layout), settled(ViewOptions, view)
     radius_mm = chosen["press_radius_mm"]
     if radius_mm is None:
         radius_mm = min(pattern.size_mm) / 4
@@ -121,6 +106,7 @@ def load_scene(
     Raises:
         CmpDesignError: no such scene, or a value that cannot be rendered.
     """
+    from cmpdesign.api.layouts import layout_from
     from cmpdesign.design.templates import find_scene
     from cmpdesign.scene.files import scene_file
 
@@ -129,22 +115,23 @@ def load_scene(
 
 def render(
     layout: LayoutLike | AnyLayout,
-    scene: str | Path | None = None,
+    scene: Annotated[str | Path | None, Written(metavar="FILE")] = None,
     *,
-    size: tuple[int, int] | None = None,
-    seed: int | None = None,
+    size: Annotated[tuple[int, int] | None, Written(metavar="WxH", most=9999)] = None,
+    seed: Annotated[int | None, Written(least=0)] = None,
     **view: Unpack[ViewOptions],
 ) -> Rendered:
-    """Draw a camera's picture of a pattern, with the exact truth, as the command ``render`` does.
+    """Render a pattern as a camera sees the pattern. The picture is seeded, and exact to a thousandth of a pixel.
 
     >>> rendered = cmpdesign.render(layout, pitch_px=22, rotation_deg=12, tilt_deg=15, noise=2, seed=1)
     >>> rendered.image, rendered.truth.marker_xy_px       # (H, W, 3) uint8 BGR; (M, 2) px
     >>> cmpdesign.render(layout, "pressed-ball").save("pressed.png", truth="pressed.npz")
 
     Args:
-        layout: see ``plain_scene``.
-        scene: a scene template's name or a TOML file; None: the plain picture that ``view`` describes.
-        size: (width, height) in px; None: the scene's, or 640 x 480.
+        layout: the pattern's layout.json; or a layout, a ``Reference``, the JSON object of a layout file.
+        scene: scene TOML, or the name of a scene template: flat-print, press-and-twist, pressed-ball,
+            tac3d-binocular; None: the plain picture of the other options.
+        size: width and height in pixels; None: the scene's, or 640x480.
         seed: seed of all random parts; None: the scene's, or 0.
         view: see ``ViewOptions``; only without ``scene``, whose file has these values.
 
@@ -216,8 +203,8 @@ class Verifier:
 
     layouts: Reference | Sequence[Reference]
     min_share: float = 0.9
-    response: Literal["srgb", "linear"] | float | None = None
-    channels: Literal["bgr", "rgb"] = "bgr"
+    response: Response | None = None
+    channels: Channels = "bgr"
     sheet_dpi: float | None = None
     max_pixels: int = MOST_PIXELS
     preset: Preset = "balanced"
@@ -275,14 +262,20 @@ class Verifier:
 
 
 class VerifyOptions(TypedDict, total=False):
-    """Options of ``verify``: the attributes of ``Verifier``."""
+    """Options of ``verify``: the attributes of ``Verifier``.
 
-    min_share: float
-    response: Literal["srgb", "linear"] | float | None
-    channels: Literal["bgr", "rgb"]
-    sheet_dpi: float | None
-    max_pixels: int
-    preset: Preset
+    Keys:
+        min_share: share of the visible markers that must be measured.
+        sheet_dpi: the pictures are print sheets of this resolution (0: unknown); the files' own resolution is ignored.
+        preset, response, channels, max_pixels: see ``SequenceOptions``.
+    """
+
+    min_share: Annotated[float, Usual(0.9, least=0, most=1)]
+    sheet_dpi: Annotated[float | None, Usual(None, least=0)]
+    preset: Annotated[Preset, Usual("balanced")]
+    response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
+    channels: Annotated[Channels, Usual("bgr")]
+    max_pixels: Annotated[int, Usual(MOST_PIXELS, metavar="COUNT", least=256)]
 
 
 def verify(
@@ -292,7 +285,7 @@ def verify(
     report: str | Path | None = None,
     **options: Unpack[VerifyOptions],
 ) -> Verdict | SheetVerdict:
-    """Extract a picture and judge it, as the command ``verify`` does: numbering, colors, share, side.
+    """Extract a picture and check the numbering, the colors, the share of measured markers and the side.
 
     >>> verdict = cmpdesign.verify("out/layout.json", "out/sample.png")
     >>> verdict.verified, verdict.reason, verdict.markers.xy_px[217]
@@ -305,7 +298,7 @@ def verify(
         image: a file, or (H, W, 3) uint8 or uint16.
         report: file (.zip) that bundles picture, layout, settings and stages, to send with a picture that is not
             read; None: no file.
-        options: see ``Verifier``.
+        options: see ``VerifyOptions``.
 
     Returns:
         The verdict; of a picture of a print sheet a ``SheetVerdict`` with the scales and the skew of the print.
@@ -316,6 +309,8 @@ def verify(
         extractor.LayoutError: a layout that cannot be read, or layouts that are no family.
         OutputError: the report cannot be written.
     """
+    from cmpdesign.api.layouts import reference_from
+
     layouts = [layout] if isinstance(layout, str) or not isinstance(layout, Sequence) else list(layout)
     verifier = Verifier([reference_from(one) for one in layouts], **options)
     if report is not None and len(layouts) != 1:
@@ -324,6 +319,19 @@ def verify(
     if report is not None:
         _write_report(verifier, _layout_text(layouts[0]), image, verdict, Path(report))
     return verdict
+
+
+def new_report(verifier: Verifier, layout_text: str) -> ProblemReport:
+    """The bundle of pictures, layout and settings, without a picture."""
+    from cmpdesign.reading.problem_report import ProblemReport
+
+    settings = {
+        "preset": verifier.preset,
+        "response": None if verifier.response is None else str(verifier.response),
+        "channels": verifier.channels,
+        "min_share": verifier.min_share,
+    }
+    return ProblemReport(layout_text, settings)
 
 
 def _write_report(
@@ -336,17 +344,10 @@ def _write_report(
     """Write the bundle of one picture; an array is kept as PNG."""
     from cmpdesign.files.images import to_png
     from cmpdesign.inputs.files import read_file
-    from cmpdesign.reading.problem_report import ProblemReport
     from cmpdesign.reading.verify import Verdict
     from extractor.draw import draw_stages
 
-    settings = {
-        "preset": verifier.preset,
-        "response": None if verifier.response is None else str(verifier.response),
-        "channels": verifier.channels,
-        "min_share": verifier.min_share,
-    }
-    bundle = ProblemReport(layout_text, settings)
+    bundle = new_report(verifier, layout_text)
     if isinstance(image, str | Path):
         name, content = Path(image).name, read_file(image)
     else:
@@ -364,4 +365,6 @@ def _layout_text(layout: LayoutLike | AnyLayout) -> str:
         from cmpdesign.inputs.files import read_text
 
         return read_text(layout)
+    from cmpdesign.api.layouts import layout_from
+
     return layout_from(layout).to_json()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from cmpdesign.inputs.files import MOST_PIXELS
-from cmpdesign.inputs.options import settled
+from cmpdesign.inputs.options import Written, settled
 from cmpdesign.tracking.jobs.options import ShapeOptions, TrackOptions
 
 if TYPE_CHECKING:
@@ -40,8 +40,9 @@ def track(
     For markers frame by frame without a file, use ``cmpdesign.open_source`` and ``extractor.Tracker``.
 
     Args:
-        layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file.
-        source: see ``open_source``.
+        layout: the pattern's layout.json; or a layout, a ``Reference``, the JSON object of a layout file.
+        source: pictures, folders, patterns such as "run*/*.png", a video, a camera's number, or rtsp://...; or what
+            ``open_source`` takes.
         output: table (.npz, .parquet, .csv), or recording (.mcap, .rrd; without ending a rosbag2 folder).
         on_frame: called with every ``extractor.Tracked``.
         options: see ``TrackOptions``.
@@ -58,8 +59,8 @@ def track(
 def reconstruct(
     layout: LayoutLike | AnyLayout,
     rig: str | Path,
-    rest: str | Path | int | Sequence[str | Path],
-    source: str | Path | int | Sequence[str | Path | int],
+    rest: Annotated[str | Path | int | Sequence[str | Path], Written(with_commas=True)],
+    source: Annotated[str | Path | int | Sequence[str | Path | int], Written(with_commas=True)],
     output: str | Path,
     *,
     on_frame: Callable[[Any], None] = lambda frame: None,
@@ -73,8 +74,9 @@ def reconstruct(
     Args:
         layout: see ``track``.
         rig: the views: a TOML file with [[view]] tables.
-        rest: the pattern at rest: an image, or a frame's number in ``source``; for several sources a sequence.
-        source: see ``open_source``; for several cameras a sequence with one for each view.
+        rest: the pattern at rest: an image, or a frame's number in ``source``; or for several sources a sequence.
+        source: a folder of pictures, a pattern such as "run/*.png", a video, a camera's number, or rtsp://...; one for
+            each view, with commas; or a sequence with one for each view.
         output: table (.npz, .parquet, .csv), or recording (.mcap, .rrd; without ending a rosbag2 folder).
         on_frame: called with every ``extractor.ShapeFrame``.
         options: see ``ShapeOptions``.

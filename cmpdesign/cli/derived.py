@@ -1,56 +1,102 @@
-"""Commands from calls: the options of a command, their types, defaults and help texts are those of the call."""
+"""Commands from calls: the parameters of a command, their types, defaults and help texts are those of the call.
+
+A call's parameters without default are arguments, the others are options; ``output`` is an option, too. The docstring's
+entries are the help texts: what follows "; or " is for programs only, what follows "; None: " is the default, and "see
+``name``" stands for the entry of another call or record.
+"""
 
 from __future__ import annotations
 
+import builtins
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, Unpack, get_args, get_origin
 
 import typer
 
-from cmpdesign.cli.options.response import parse_reading_response
-from cmpdesign.inputs.options import Option, Response, options_of
+from cmpdesign.cli.options.completions import COMPLETIONS
+from cmpdesign.cli.options.texts import parse_pairs, parse_pixels, parse_reading_response
+from cmpdesign.cli.progress import working
+from cmpdesign.cli.terminal import finish
+from cmpdesign.inputs.options import Response, Written, options_of
+from cmpdesign.tracking.jobs.options import SequenceOptions
+from cmpdesign.watch import watched
 
-Run = Callable[..., None]
+Run = Callable[..., Any]
 Takes = TypeVar("Takes", bound=Run)
-_ENTRY = re.compile(r"^    (?:    )?(\w+): (.*(?:\n {8,}\S.*)*)", re.MULTILINE)
+Parse = Callable[[Any], Any]
+LAYOUT = "the pattern's layout.json"
+_ENTRY = re.compile(r"^    (?:    )?(\w+(?:, \w+)*): (.*(?:\n {8,}\S.*)*)", re.MULTILINE)
+_REQUIRED = inspect.Parameter.empty
 
 
-def derived(call: Callable[..., Any], *records: type, **arguments: Any) -> Callable[[Takes], Run]:
-    """Give a command the options of a call.
+@dataclass(frozen=True)
+class _Taken:
+    """A parameter of a call.
+
+    Attributes:
+        name: its name.
+        kind: its type.
+        default: its default; ``_REQUIRED``: none.
+        written: how the command line writes it.
+        is_argument: it is given by its place.
+    """
+
+    name: str
+    kind: Any
+    default: Any
+    written: Written
+    is_argument: bool = False
+
+
+def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Callable[[Takes], Run]:
+    """Give a command the parameters of a call.
 
     Args:
-        call: the call, whose docstring describes arguments and the command.
-        records: the ``TypedDict`` of the call's keywords, then the one that it extends, if any.
-        arguments: argument of the call -> annotated type on the command line, or a type alone, whose help text is the
-            docstring's.
+        call: the call, whose docstring describes parameters and the command.
+        doing: what the call does, for the progress; empty: the command's function calls it.
+        arguments: parameter of the call -> another help text; None: the command does not have the parameter.
 
-    The command's function receives the arguments, its own parameters, and all options as keywords. Its docstring
-    follows the first paragraph of the call's.
+    With ``doing``, the call's record goes to the command's function, which prints the record for people and may return
+    an exit code; with ``--json`` the record is printed. Without it, the function receives all values as keywords. The
+    function's own keyword-only parameters are further options, flags last. Its docstring follows the first sentence of
+    the call's.
     """
-    described = [each for source in (call, *records) for each in _meanings(source)]
-    meanings, shared = dict(described), {name for record in records[1:] for name in record.__annotations__}
-    options = sorted(options_of(records[0]), key=lambda option: option.name in shared)
+    left_out = {name for name, words in arguments.items() if words is None}
+    taken = [each for each in _taken(call) if each.name not in left_out]
+    taken.sort(key=lambda each: 0 if each.is_argument else 1 if each.name == "output" else 2)
+    meanings = _meanings(call) | {name: words for name, words in arguments.items() if words is not None}
 
     def decorated(run: Takes) -> Run:
         extra = [
-            each
-            for each in inspect.signature(run, eval_str=True).parameters.values()
+            each.replace(annotation=_evaluated(each.annotation, run.__globals__))
+            for each in inspect.signature(run).parameters.values()
             if each.kind is each.KEYWORD_ONLY
         ]
+        parsers = {each.name: _parser(each) for each in taken}
 
         def command(**values: Any) -> None:
-            if values.get("response") is not None:
-                values["response"] = parse_reading_response(values["response"])
-            run(**values)
+            values = {name: parsers[name](each) if name in parsers else each for name, each in values.items()}
+            if not doing:
+                run(**values)
+                return
+            own = {each.name: values.pop(each.name) for each in extra}
+            with working(doing) as steps, watched(steps.tell):
+                done = call(**values)
+            exit_code = run(done, **own) or 0
+            finish(lambda: done, exit_code)
 
-        written = [_argument(name, kind, meanings) for name, kind in arguments.items()]
-        written += [_option(option, meanings) for option in options]
-        command.__signature__ = inspect.Signature([*written, *extra])  # type: ignore[attr-defined]
-        command.__annotations__ = {each.name: each.annotation for each in (*written, *extra)}
+        of_call = [_parameter(each, meanings) for each in taken]
+        placed = sum(each.is_argument for each in taken) + any(each.name == "output" for each in taken)
+        modes = [each for each in extra if each.default is False]
+        values = [each for each in extra if each.default is not False]
+        written = [*of_call[:placed], *values, *of_call[placed:], *modes]
+        command.__signature__ = inspect.Signature(written)  # type: ignore[attr-defined]
+        command.__annotations__ = {each.name: each.annotation for each in written}
         command.__name__ = run.__name__
         command.__doc__ = f"{_first_sentence(call)}\n\n{inspect.getdoc(run) or ''}".strip()
         return command
@@ -58,56 +104,158 @@ def derived(call: Callable[..., Any], *records: type, **arguments: Any) -> Calla
     return decorated
 
 
-def _meanings(described: Any) -> Iterator[tuple[str, str]]:
-    """Name and meaning of every argument or key in a docstring."""
-    for name, text in _ENTRY.findall(inspect.getdoc(described) or ""):
-        yield name, " ".join(text.split())
+class _Names(dict[str, Any]):
+    """The names of a module; a name that only type checkers import is a type of Python alone."""
+
+    def __missing__(self, name: str) -> Any:
+        return getattr(builtins, name, _PythonOnly)
+
+
+class _PythonOnly:
+    """Stands for a type that the command line cannot write."""
+
+    def __class_getitem__(cls, item: object) -> type:
+        return cls
+
+
+def _evaluated(text: Any, names: Mapping[str, Any]) -> Any:
+    return eval(text, {}, _Names(names)) if isinstance(text, str) else text
+
+
+def _taken(call: Callable[..., Any]) -> Iterator[_Taken]:
+    """The parameters: those of the signature, then the keys of its records, those of ``SequenceOptions`` last."""
+    names = call.__globals__
+    for each in inspect.signature(call).parameters.values():
+        kind = _evaluated(each.annotation, names)
+        if each.kind is each.VAR_KEYWORD:
+            assert get_origin(kind) is Unpack, f"{call.__name__}: **{each.name} is no record"
+            (record,) = get_args(kind)
+            shared = SequenceOptions.__annotations__
+            for option in sorted(options_of(record), key=lambda option: option.name in shared):
+                yield _Taken(option.name, option.type, option.usual.value, option.usual)
+            continue
+        if not isinstance(kind, UnionType) and get_origin(kind) is Annotated:
+            kind, written = get_args(kind)
+        else:
+            written = next(
+                (one.usual for one in options_of(SequenceOptions) if one.name == each.name), Written()
+            )
+        default = each.default if written.needed is None else _REQUIRED if written.needed else None
+        is_placed = each.kind is each.POSITIONAL_OR_KEYWORD and each.default is _REQUIRED
+        is_argument = is_placed and each.name != "output" and written.name is None
+        yield _Taken(each.name, kind, default, written, is_argument)
+
+
+def _meanings(described: Any) -> dict[str, str]:
+    """Name -> meaning of every argument or key in a docstring and in the docstrings that it names."""
+    found = dict(_meanings(SequenceOptions)) if described is not SequenceOptions else {}
+    names = getattr(described, "__globals__", None) or vars(inspect.getmodule(described))
+    for entry, text in _ENTRY.findall(inspect.getdoc(described) or ""):
+        meaning = " ".join(text.split())
+        other = re.match(r"see ``(\w+)``", meaning)
+        elsewhere = _meanings(names[other[1]]) if other and other[1] in names else {}
+        for name in entry.split(", "):
+            if not meaning.startswith("see "):
+                found[name] = meaning
+            elif name in elsewhere:
+                found[name] = elsewhere[name]
+        if elsewhere and isinstance(names[other[1]], type):  # type: ignore[index]
+            found |= elsewhere
+    return {"layout": LAYOUT, **found}
 
 
 def _first_sentence(call: Callable[..., Any]) -> str:
     text = " ".join((inspect.getdoc(call) or "").partition("\n\n")[0].split())
-    return re.sub(r", as the command ``[^`]+`` does", "", text)
+    return re.sub(r",? as the commands? ``[^`]+`` do(es)?(?=[.;:])", "", text)
 
 
 def _help(text: str) -> str:
     """A meaning as a help text: a sentence, the meaning of None as the default."""
-    meaning, _, absent = text.rstrip(".").partition("; None: ")
+    meaning, _, absent = re.sub(r"(?<!\.)\.$", "", text).partition("; None: ")
+    meaning = meaning.partition("; or ")[0]
     sentence = re.sub(r"``([^`]+)``", lambda found: found[1].upper(), meaning)
     sentence = sentence if re.match(r"rgb:", sentence) else sentence[:1].upper() + sentence[1:]
-    return f"{sentence}." + (f" [default: {absent}]" if absent else "")
+    return sentence + ("" if sentence.endswith("...") else ".") + (f" [default: {absent}]" if absent else "")
 
 
-def _argument(name: str, kind: Any, meanings: dict[str, str]) -> inspect.Parameter:
-    if get_origin(kind) is not Annotated:
-        words = _help(meanings[name])
-        info: Any = typer.Argument(metavar=name.upper(), help=words)
+def _parameter(taken: _Taken, meanings: Mapping[str, str]) -> inspect.Parameter:
+    """The parameter as typer reads it."""
+    name, written, kind = taken.name, taken.written, _written_type(taken)
+    meaning = meanings[name].partition("; None: ")[0] if written.needed else meanings[name]
+    words: dict[str, Any] = {"help": _help(meaning), "metavar": written.metavar}
+    words["autocompletion"] = COMPLETIONS.get(name)
+    if kind in (int, int | None, float, float | None):
+        words |= {"min": written.least, "max": written.most}
+    if taken.is_argument:
+        several = kind == list[str] or kind == list[Path]
+        words["metavar"] = written.metavar or (name.removesuffix("s") if several else name).upper()
+        info: Any = typer.Argument(**words)
+    else:
+        word = written.name or f"--{name.replace('_', '-')}"
         if name == "output":
-            info = typer.Option("-o", "--output", metavar="FILE", help=words)
-        kind = Annotated[kind, info]
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind)
-
-
-def _option(option: Option, meanings: dict[str, str]) -> inspect.Parameter:
-    name, usual = option.name, option.usual
-    word = usual.name or f"--{name.replace('_', '-')}"
-    info = typer.Option(word, metavar=usual.metavar, help=_help(meanings[name]))
+            words["metavar"] = written.metavar or "FILE"
+        info = typer.Option(*(("-o", word) if name == "output" else (word,)), **words)
+    default = taken.default
+    if isinstance(default, tuple):
+        default = "x".join(map(str, default)) if default else None
+    kind = kind | None if default is None and get_origin(kind) is list else kind
     return inspect.Parameter(
-        name,
-        inspect.Parameter.KEYWORD_ONLY,
-        default=usual.value,
-        annotation=Annotated[_written_type(option.type), info],
+        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]
     )
 
 
-def _written_type(kind: Any) -> Any:
+def _members(kind: Any) -> list[Any]:
+    """The types of a union, without None."""
+    return [each for each in (get_args(kind) if _is_union(kind) else [kind]) if each is not NoneType]
+
+
+def _is_union(kind: Any) -> bool:
+    return get_origin(kind) in (Union, UnionType)
+
+
+def _is_pixels(kind: Any) -> bool:
+    return any(get_origin(each) is tuple for each in _members(kind))
+
+
+def _written_type(taken: _Taken) -> Any:
     """The type that the command line parses: texts for responses, and for what may be a number or a path."""
-    if get_origin(kind) not in (Union, UnionType):
-        return kind
-    members = [each for each in get_args(kind) if each is not NoneType]
-    if set(members) == set(get_args(Response)) or (int in members and Path in members):
-        return str | None
-    if Path in members:
-        return Path | None
-    assert len(members) == 1, kind
-    (only,) = members
-    return only | None if get_origin(only) is not Literal else Union[only, None]  # noqa: UP007
+    members = _members(taken.kind)
+    is_absent = taken.default is None
+    if taken.written.with_commas:
+        return str
+    several = [each for each in members if get_origin(each) in (Sequence, list) or _is_mapping(each)]
+    if several:
+        # one or several sources are texts, as patterns and numbers of cameras; a list of files are paths
+        is_of_files = (
+            len(members) == 1 and not _is_mapping(several[0]) and Path in _members(get_args(several[0])[0])
+        )
+        return list[Path] if is_of_files else list[str]
+    if set(members) == set(get_args(Response)) or _is_pixels(taken.kind) or {str, int} <= set(members):
+        kind: Any = str
+    elif Path in members or _PythonOnly in members:
+        kind = Path
+    else:
+        assert len(members) == 1, taken
+        (kind,) = members
+    return Union[kind, None] if is_absent else kind  # noqa: UP007
+
+
+def _is_mapping(kind: Any) -> bool:
+    return get_origin(kind) is Mapping
+
+
+def _parser(taken: _Taken) -> Parse:
+    """From what typer gives to what the call takes."""
+    members, option = _members(taken.kind), taken.written.name or f"--{taken.name.replace('_', '-')}"
+    if set(members) == set(get_args(Response)):
+        return parse_reading_response
+    if _is_pixels(taken.kind):
+        most = int(taken.written.most or 99_999)
+        return lambda text: None if text is None else parse_pixels(option, text, most)
+    for each in members:
+        if _is_mapping(each):
+            key = get_args(each)[0]
+            return lambda texts: parse_pairs(option, texts or [], key, taken.written)
+    if get_origin(members[0]) is Sequence and taken.default == ():
+        return lambda values: values or ()
+    return lambda value: value

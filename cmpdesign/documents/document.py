@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
 
 class DocumentPart(BaseModel):
@@ -18,13 +18,26 @@ def _require_format(schema: dict[str, Any]) -> None:
 
 
 class Document(DocumentPart):
-    """The document that a command prints with ``--json``.
+    """The record that a call returns and that its command prints with ``--json``.
 
     A document has the fields ``format`` and ``version``. The version rises when a field is removed or changes its
     meaning or type; a new field does not raise the version.
     """
 
     model_config = ConfigDict(json_schema_extra=_require_format)
+    _found: Any = PrivateAttr(None)
+
+    @classmethod
+    def of(cls, found: object, **fields: Any) -> Self:
+        """The document of a value that is more than a document can hold, as arrays."""
+        made = cls(**fields)
+        made._found = found
+        return made
+
+    @property
+    def found(self) -> Any:
+        """The value behind the figures, as the call states; None where the figures are all."""
+        return self._found
 
     def to_json(self) -> str:
         """The text of the document."""

@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-from cmpdesign.errors import InputError
+from cmpdesign.errors import CmpDesignError, InputError, parameter
 
 MOST_TEXT_BYTES = 1 << 24  # 16 MiB: of a document; the largest document that a command writes has some 3 MiB
 MOST_PIXELS = 250_000_000  # of an image; A4 at 1200 dpi has 139 million
@@ -19,6 +19,24 @@ _KINDS = {
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }
+
+
+def require_suffix(name: str, path: str | Path | None, *expected: str) -> None:
+    """Check the ending of the name of a file to write, if a file is given; the ending states the format.
+
+    Args:
+        name: the call's parameter.
+        path: its value.
+        expected: endings.
+
+    Raises:
+        CmpDesignError: another ending.
+    """
+    if path is not None and Path(path).suffix.lower() not in expected:
+        one_of = "one of " if len(expected) > 1 else ""
+        raise CmpDesignError(
+            f"{parameter(name, str(path))}: unknown ending; expected {one_of}{', '.join(expected)}"
+        )
 
 
 def open_file(path: str | Path) -> BinaryIO:

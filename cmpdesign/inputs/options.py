@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
@@ -16,23 +17,40 @@ Response = Literal["srgb", "linear"] | float
 Options = TypeVar("Options")
 
 
+@dataclass(frozen=True, kw_only=True)
+class Written:
+    """How the command line writes a parameter of a call, the second part of its annotation.
+
+    Attributes:
+        metavar: what stands for the value in help texts; None: its type.
+        least: smallest value; None: none.
+        most: largest value, of a size the largest side; None: none.
+        above: the value must be above this number; None: none.
+        name: name on the command line, if it differs, as "--live-wait".
+        needed: the command line requires the value, unlike the call, or does not; None: as the call does.
+        with_commas: several values are one text.
+        example: a value, for the message on a text that is none.
+    """
+
+    metavar: str | None = None
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    name: str | None = None
+    needed: bool | None = None
+    with_commas: bool = False
+    example: str = ""
+
+
 @dataclass(frozen=True)
-class Usual:
-    """The default of an option, the second part of its annotation.
+class Usual(Written):
+    """The default of a key of a record of options, and how the command line writes the key.
 
     Attributes:
         value: the default.
-        metavar: what stands for the value in help texts; None: its type.
-        least: smallest value; None: none.
-        above: the value must be above this number; None: none.
-        name: name on the command line, if it differs, as "--live-wait".
     """
 
     value: Any
-    metavar: str | None = None
-    least: float | None = None
-    above: float | None = None
-    name: str | None = None
 
 
 @dataclass(frozen=True)
@@ -75,6 +93,8 @@ def settled(record: type[Options], given: Mapping[str, Any]) -> Options:
 def _require_within(name: str, value: Any, usual: Usual) -> None:
     if value is None:
         return
+    if isinstance(value, float) and not math.isfinite(value) and usual.above is usual.least is None:
+        raise CmpDesignError(f"{parameter(name)} is {value}; expected a finite number")
     if usual.above is not None and not usual.above < value < float("inf"):
         raise CmpDesignError(f"{parameter(name)} is {value:g}; expected a number above {usual.above:g}")
     if usual.least is not None and not usual.least <= value < float("inf"):

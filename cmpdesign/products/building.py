@@ -11,6 +11,7 @@ from cmpdesign.design.design import Design
 from cmpdesign.layout.checks import CAMERA_PX, Finding, check_design
 from cmpdesign.layout.layout import Layout
 from cmpdesign.layout.report import DesignReport, design_report
+from cmpdesign.patterns.pad_code import CodeFigures, code_figures
 from cmpdesign.products.registry import make_products, pads_as_made, product_folders
 
 if TYPE_CHECKING:
@@ -52,11 +53,13 @@ class Checked:
         findings: errors first.
         readings: name of a product -> the extractor's reading of its pad; empty unless pads were read.
         unread: name of a product -> why its pad cannot be made and is not read.
+        code: key figures of the pad's code; None without a code.
     """
 
     findings: tuple[Finding, ...]
     readings: Mapping[str, PadReading]
     unread: Mapping[str, str]
+    code: CodeFigures | None = None
 
     @property
     def works(self) -> bool:
@@ -128,9 +131,10 @@ def check_products(
     from cmpdesign.products.as_made.reading import clip_findings, read_pads
 
     findings = [*check_design(design, layout, camera_px), *clip_findings(layout, camera_px)]
+    code = None if layout.code is None else code_figures(int(layout.parameters["layers"]), layout.code)
     if not read:
-        return Checked(tuple(findings), {}, {})
+        return Checked(tuple(findings), {}, {}, code)
     pads, unread = pads_as_made(design, layout)
     found = read_pads(pads, camera_px, preset)
     findings = sorted([*findings, *found.findings], key=lambda finding: finding.severity)
-    return Checked(tuple(findings), found.readings, unread)
+    return Checked(tuple(findings), found.readings, unread, code)

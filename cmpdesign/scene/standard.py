@@ -21,12 +21,12 @@ STANDARD_SIZE = (640, 480)
 STANDARD_LAYERS = 11
 
 
-def standard_layout(pattern: str = "honeycomb", layers: int = STANDARD_LAYERS) -> Layout:
-    """The pattern of the standard scene."""
+def standard_layout(pattern: str = "honeycomb", layers: int = STANDARD_LAYERS, code: int = 0) -> Layout:
+    """The pattern of the standard scene, plain or with a code."""
     from cmpdesign.design.design import load_design
     from cmpdesign.layout.build import build_layout
 
-    return build_layout(load_design(pattern, {"layers": str(layers), "pitch_mm": "1.0"}))
+    return build_layout(load_design(pattern, {"layers": str(layers), "pitch_mm": "1.0", "code": str(code)}))
 
 
 def standard_scene(layout: Layout | None = None, *, seed: int = 0) -> Scene:

@@ -1,9 +1,9 @@
 """Stages 2 and 3: the cells of an image by contrast over the local black, in whatever channels show them best.
 
-A cell is a triangle that is brighter than the black around it. Seven maps show cells: each channel, the sum of the
-channels, and each channel over the mean of the others. In each map the regions above a share of the local contrast are
-taken; regions with the moments of triangles may be cells. Of several at one place the best triangle is kept. No hue and
-no color of the light is assumed.
+A cell is a triangle that is brighter than the black around it. Maps show cells: each channel, the sum of the channels,
+and each channel over the mean of the others, or for coded pads over the least channel. In each map the regions above a
+share of the local contrast are taken; regions with the moments of triangles may be cells. Of several at one place the
+best triangle is kept. No hue and no color of the light is assumed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Effort(NamedTuple):
 
     Attributes:
         maps: (K,) int64, their numbers: 0 to 2 the channels, 3 their sum, 4 to 6 each channel over the mean of the
-            others.
+            others, 7 to 9 each channel over the least one.
         shares: of the local contrast, the levels.
     """
 
@@ -43,9 +43,13 @@ EFFORTS = (
     Effort(np.arange(7), np.array([0.32, 0.5, 0.65])),
     Effort(np.arange(7), np.array([0.2, 0.42, 0.75])),
 )
-# The white cells of a coded pad lie at the sides of inks, and no channel shows both apart; a channel over the others
-# shows the ink alone.
-CODED_EFFORTS = (Effort(np.arange(4, 7), np.array([0.5])), *EFFORTS[1:])
+# The white cells of a coded pad lie at the sides of inks, and no channel shows both apart. Over the least channel white
+# is as dark as black.
+OVER_LEAST = np.arange(7, 10)
+CODED_EFFORTS = (
+    Effort(OVER_LEAST, EFFORTS[0].shares),
+    *(one._replace(maps=np.concatenate([np.arange(4), OVER_LEAST])) for one in EFFORTS[1:]),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,7 +150,7 @@ def lattice_of(reference: Reference) -> Lattice:
     return Lattice(
         layers=int(reference.layer.max()),
         marker_mm=reference.xy_mm,
-        cell_lookup=_cell_lookup_table(coordinates[lower_left], int(reference.layer.max())),
+        cell_lookup=cell_lookup_table(coordinates[lower_left], int(reference.layer.max())),
         corner_ids=corner_marker_ids(coordinates[lower_left]),
         ink=(reference.cell_color[inked] + 1).astype(np.uint8),
         axial=coordinates[lower_left],
@@ -162,7 +162,7 @@ def lattice_of(reference: Reference) -> Lattice:
     )
 
 
-def _cell_lookup_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
+def cell_lookup_table(axial: NDArray[np.int32], layers: int) -> NDArray[np.int32]:
     """(S, S) int32, S = 2 layers + 3: each cell's number at its axial place; the border and free places hold -1."""
     lookup = np.full((2 * layers + 3, 2 * layers + 3), -1, np.int32)
     lookup[axial[:, 0] + layers + 1, axial[:, 1] + layers + 1] = np.arange(len(axial))
@@ -177,6 +177,13 @@ def _down_axial(corners: NDArray[np.int32]) -> NDArray[np.int32]:
 def cells_at(axial: NDArray[np.int32], lattice: Lattice) -> NDArray[np.int32]:
     """(N,) int32, the layout's cell at each axial (q, r) of (N, 2), or -1."""
     return native.cells_at(np.ascontiguousarray(axial, dtype=np.int32), lattice.cell_lookup)
+
+
+def cells_between_whites(lattice: Lattice) -> int:
+    """The number of colored cells with two or three white cells at their sides, which may hide them."""
+    steps = np.array([[0, 0], [-1, 0], [-1, 1]], np.int32)  # to the up-cells that share a side
+    cells = cells_at((lattice.white_axial[:, None] + steps).reshape(-1, 2), lattice)
+    return int((np.bincount(cells[cells >= 0]) > 1).sum())
 
 
 def corner_marker_ids(axial: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -23,6 +23,7 @@ from extractor.image.pyramid import PyramidLevel
 from extractor.layout.lattice_tables import Lattice, cells_at
 from extractor.numbering.code_bits import Agreement, CodeBits
 from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
+from extractor.numbering.joined_parts import joined_to
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
     ATTACHMENT,
@@ -42,7 +43,7 @@ SIDE_LEAD = 0.6  # of the naming of the other side over that of the stated one, 
 MAX_TIED = 60  # motions between which the other parts may decide; chosen, for time
 OTHER_WHITE = 6.0  # log odds against a motion with a white triangle at a black cell; chosen
 LEAD = 8.0  # log odds of the best motion over the second best; chosen
-JOINT_LEAD = 30.0  # the same where other parts decide: ten cells; they are not independent. Chosen
+JOINT_LEAD = 45.0  # the same where other parts decide: 15 cells; they are not independent. Chosen
 MIN_NUMBERED_SHARE = 0.5  # of the cells of large parts; with fewer, all motions are compared. Chosen
 ODD_INK = -8.0  # log likelihood of a cell's class below which the cell is on a wrong place; chosen
 
@@ -271,7 +272,7 @@ class Registration:
         certain = [one for one in placed if one.is_certain]
         if placed and not certain:
             fewest = min(placed, key=lambda one: len(one.tied) or MAX_TIED)
-            certain = self._with_all_parts(fewest, len(fewest.tied))
+            certain = self._decided_by_all(image, fewest, bright)
         for one in certain:
             numbering = self._number_with(one, placed)
             if numbering is not None:
@@ -336,6 +337,22 @@ class Registration:
             beside = cells_at(np.array([[q, r], [q - 1, r], [q - 1, r + 1]], np.int32), self._lattice)
             count += (q, r) != (0, 0) and bool((beside >= 0).all())
         return count
+
+    def _decided_by_all(
+        self, image: _WalkedImage, placed: PlacedPart, bright: BrightPlaces
+    ) -> list[PlacedPart]:
+        """The part with a motion that is certain by the cells and bits of all parts; else nothing.
+
+        Parts that can be joined to the part without the layout have one motion with the part, and no vote of their own.
+        """
+        seen = placed.seen
+        cells = joined_to(seen.part, seen.cells, seen.fields.odds, self._lattice.layers)
+        if np.count_nonzero(cells.part == seen.part) > np.count_nonzero(placed.is_own):
+            fields = ink_fields(image.view, cells, image.light, seen.part)
+            placed = self.register(seen._replace(cells=cells, fields=fields), bright)
+        is_certain = placed.is_certain and (placed.bits is not None or placed.lead >= JOINT_LEAD)
+        found = [placed] if is_certain else self._with_all_parts(placed, len(placed.tied))
+        return [one._replace(seen=seen) for one in found]
 
     def _with_all_parts(self, placed: PlacedPart, count: int) -> list[PlacedPart]:
         """The part with a certain motion, if the other parts decide between its best motions; else nothing.

@@ -16,7 +16,7 @@ from extractor.image.input import Channels
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response
 from extractor.layout.layout_file import LayoutLike, layout_of
-from extractor.pipeline import Extractor, NumberedMarkers, Side, Stages, no_markers
+from extractor.pipeline import ImageReader, NumberedMarkers, Side, Stages, no_markers
 from extractor.presets import Preset
 from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edge
@@ -150,7 +150,7 @@ class Tracker:
     ) -> None:
         self.layout = layout = layout_of(layout)
         self.rest: Rest | None = None
-        self._extractor = Extractor(layout, preset, response, side, channels)
+        self._reader = ImageReader(layout, preset, response, side, channels)
         self._mm_per_px = mm_per_px
         self._tables: WarmTables | None = build_warm_tables(layout) if warm else None
         self._sampled_edges = np.ascontiguousarray(layout.edges[::EDGE_SAMPLING_STEP])
@@ -189,48 +189,49 @@ class Tracker:
 
     def _read(self, image: NDArray[Any]) -> tuple[Markers, StartKind | None]:
         """The markers of an image by a warm or a cold start, and the kind of start; None without markers."""
-        warm = self._try_warm_start(image)
+        stages = Stages()
+        pyramid = self._reader.pyramid(image, stages)
+        warm = self._try_warm_start(pyramid, stages)
         if warm is not None:
             return warm
-        markers, appearance = self._extractor.read(image)
+        markers, appearance = self._reader.read_pyramid(pyramid, stages)
         if not markers.found:
             if (
                 self._state is not None
             ):  # the next frame may start from these positions, but not from velocities
                 self._state = replace(self._state, previous_px=None, is_before_gap=True)
             return markers, None
-        bgr = self._extractor.to_bgr(image)
-        if self._tables is not None and bgr is not None:
-            check = check_cells(bgr, markers.xy_px[self._tables.corners], self._tables, None)
+        if self._tables is not None and pyramid is not None:
+            check = check_cells(
+                pyramid.level(1).image, markers.xy_px[self._tables.corners], self._tables, None
+            )
             _fill_unseen_levels(check.cell_levels, self._tables)
             count = int((markers.status == Status.MEASURED).sum())
-            pyramid = self._extractor.pyramid(bgr, image.dtype)
             self._update_state(pyramid, markers, appearance, check.cell_levels, count, 0)
-            markers = self._settle(image, markers)
+            markers = self._settle(pyramid, markers)
         return markers, StartKind.COLD
 
-    def _settle(self, image: NDArray[Any], markers: Markers) -> Markers:
+    def _settle(self, pyramid: Pyramid, markers: Markers) -> Markers:
         """The markers of a cold start after warm passes over the same image, so that equal frames agree; the markers
         as they are where the image does not prove them. The state keeps the motion from the previous frame."""
         cold = self._state
         for _ in range(SETTLING_PASSES):
-            warm = self._try_warm_start(image)
+            stages = Stages()
+            stages.record("image", pyramid.level(1).image)
+            warm = self._try_warm_start(pyramid, stages)
             if warm is None or cold is None or self._state is None:
                 break
             markers = warm[0]
             self._state = replace(self._state, previous_px=cold.previous_px, frames_since_cold=0)
         return markers
 
-    def _try_warm_start(self, image: NDArray[Any]) -> tuple[Markers, StartKind] | None:
+    def _try_warm_start(self, pyramid: Pyramid | None, stages: Stages) -> tuple[Markers, StartKind] | None:
         """The markers of a warm start, or None where the image does not prove the prediction."""
         state, tables = self._state, self._tables
         if state is None or tables is None or state.frames_since_cold >= COLD_START_INTERVAL:
             return None
-        stages = Stages()
-        bgr = stages.record("image", self._extractor.to_bgr(image))
-        if bgr is None:
+        if pyramid is None:
             return None
-        pyramid = self._extractor.pyramid(bgr, image.dtype)
         level = self._level_of_check(pyramid, state.xy_px)
         candidates = [level.to_level(state.xy_px)]
         if state.previous_px is not None:
@@ -262,7 +263,7 @@ class Tracker:
         )
         levels = (light_levels(own, pyramid.response) for own in (state.cell_levels, start.cell_levels))
         before = state.appearance and state.appearance.with_lighting(*levels)
-        markers, appearance = self._extractor.finish(pyramid, numbered, stages, before)
+        markers, appearance = self._reader.finish(pyramid, numbered, stages, before)
         count = int((markers.status == Status.MEASURED).sum())
         if count < MIN_KEPT_SHARE * state.expected_count:
             return None

@@ -100,14 +100,17 @@ def test_motions_are_those_of_the_plane(seed: int, layers: int, share: float, bl
 
 def test_seen_cells_are_clear_of_covers_and_in_the_picture() -> None:
     picture = shoot(Chain(pose=Pose(layers=5, pitch_px=30.0)))
+    cells = colored_cells(picture.layout)
     covers = np.zeros(picture.image.shape[:2], np.uint8)
-    every = seen_cells(picture, covers)
+    every = seen_cells(picture, covers, cells)
     assert np.array_equal(every, colored_cells(picture.layout))
     covers[:, :320] = 1
-    clear = seen_cells(picture, covers)
+    clear = seen_cells(picture, covers, cells)
     left = picture.marker_xy_px[picture.layout.cell_corners[every]].min(axis=(1,))[:, 0]
     assert set(clear) >= set(every[left > 325]) and not set(clear) & set(every[left < 319])
-    aside = seen_cells(replace(picture, marker_xy_px=picture.marker_xy_px + (200, 0)), np.zeros_like(covers))
+    aside = seen_cells(
+        replace(picture, marker_xy_px=picture.marker_xy_px + (200, 0)), np.zeros_like(covers), cells
+    )
     assert 0 < len(aside) < len(every)
 
 
@@ -117,3 +120,9 @@ def test_a_view_without_the_white_cell_has_no_wrong_id(kind: str) -> None:
     assert not any(result.wrong_ids for result in results)
     assert all(result.motions >= 1 and result.cells for result in results)
     assert results == [read_view(View(kind, 1, number)) for number in range(3)]
+
+
+@pytest.mark.parametrize("number", [198, 257])
+def test_parts_that_find_no_place_do_not_outvote_the_right_motion(number: int) -> None:
+    """Under the right motion of the largest part, the others found no place, and under a wrong one they did."""
+    assert read_view(View(DAMAGED, 990271, number, pitch_px=(24.0, 76.0))).wrong_ids == 0

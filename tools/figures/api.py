@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ SECTIONS = ("Args", "Attributes", "Keys", "Returns", "Raises", "Yields")
 # Package -> heading -> folders and files of the names below it.
 ROOMS = {
     "cmpdesign": {
-        "designs and layouts": "designs layouts proposal",
+        "designs and layouts": "designs making layouts proposal",
         "files, workshop and experiments": "layout files products workshop",
         "pictures": "pictures plots",
         "sequences": "sequences tracking inputs",
@@ -148,6 +149,11 @@ def _parameters(parameters: list[inspect.Parameter]) -> Iterator[str]:
 
 
 def _annotation(annotation: Any) -> str:
+    """The type as it is written, without how the command line writes it."""
+    if isinstance(annotation, str) and annotation.startswith("Annotated["):
+        whole = ast.parse(annotation, mode="eval").body
+        kind = ast.get_source_segment(annotation, whole.slice.elts[0])  # type: ignore[attr-defined]
+        return " ".join(str(kind).split())
     return annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
 
 

@@ -5,7 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 from . import api, commands, fields, gallery, measured, presets, reasons
-from .pictures import contact, drawings, failures, hero, lengths, scene_templates, sides, stages, surface
+from .pictures import (
+    coded_pads,
+    contact,
+    drawings,
+    failures,
+    hero,
+    lengths,
+    scene_templates,
+    sides,
+    stages,
+    surface,
+)
 from .pictures.tutorials import photos
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -17,6 +28,7 @@ PARTS = (
     sides,
     stages,
     failures,
+    coded_pads,
     gallery,
     contact,
     measured,

@@ -10,7 +10,7 @@ PIPELINE = (
         "cells are looked for with more effort where some are missing",
         "accuracy",
         "extractor/pipeline.py",
-        "if gains and effort is not EFFORTS[-1] and not self._is_whole(found):",
+        "if gains and effort is not self._efforts[-1] and not self._is_whole(found):",
         "if False:",
     ),
     Rule(
@@ -34,7 +34,7 @@ PIPELINE = (
         "small cells are read at a finer scale",
         "no wrong id",
         "extractor/pipeline.py",
-        "if found.is_small(view):",
+        "if found.is_small(view, self._least_edge_px):",
         "if False:",
     ),
 )

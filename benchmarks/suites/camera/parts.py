@@ -28,6 +28,7 @@ class Pose:
     Attributes:
         pattern: the name of a registered triangular pattern.
         layers: the number of its layers.
+        code: its code; 0 is the plain pattern.
         pitch_px: edge length at the pattern's middle, without foreshortening.
         roll_deg, tilt_deg, tilt_axis_deg: see ``cmpdesign.scene.Camera``.
         centre_px: position of the pattern's middle, before distortion.
@@ -35,6 +36,7 @@ class Pose:
 
     pattern: str = "honeycomb"
     layers: int = 9
+    code: int = 0
     pitch_px: float = 20.0
     roll_deg: float = 7.3
     tilt_deg: float = 0.0

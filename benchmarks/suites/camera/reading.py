@@ -76,8 +76,8 @@ class PictureResult:
 
 
 @cache
-def cached_extractor(pattern: str, layers: int, preset: Preset) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))), preset)
+def cached_extractor(pattern: str, layers: int, preset: Preset, code: int = 0) -> Extractor:
+    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers, code))), preset)
 
 
 def read_case(case: CameraCase, preset: Preset) -> PictureResult:

@@ -24,6 +24,7 @@ from benchmarks.suites.scenes import (
     make_extractor,
 )
 from extractor import Extractor
+from extractor.pipeline import ImageReader
 from extractor.presets import Preset
 
 Image = NDArray[np.uint8]
@@ -117,7 +118,9 @@ def read_by_article(case: SceneCase, image: Image) -> Reading:
     lattice = make_lattice_tables(layout)
     started = time.process_time()
     points = np.full((len(layout.layer), 2), np.nan)
-    view = reader.pyramid(np.ascontiguousarray(image), image.dtype).level(1)
+    pyramid = ImageReader(reader.layout).pyramid(image)
+    assert pyramid is not None
+    view = pyramid.level(1)
     triangles = fit_plain_triangles(grow_from_hues(view, dict(layout.palette)))
     found = number_triangles(image, triangles, connect_corners(triangles), lattice)
     if found is not None:

@@ -35,11 +35,13 @@ CLEAR_PX = 2  # distance of a seen cell from every cover and from the picture's 
 
 @dataclass(frozen=True)
 class View:
-    """One view of a run."""
+    """One view of a run. Views that differ in their codes alone differ in their white cells alone."""
 
     kind: str
     seed: int
     number: int
+    code: int = 0
+    pitch_px: tuple[float, float] = PITCH_PX
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ class ViewResult:
     Attributes:
         view: the view.
         cells: wholly seen colored cells.
-        motions: motions that put them into the pattern, the true one included.
+        black_cells: wholly seen black and white ones.
+        motions: motions that put the colored ones into the pattern, the true one included.
         motions_of_parts: motions that put partly seen cells into the pattern, too.
         reported: markers with a position.
         wrong_ids: markers reported at another marker's place.
@@ -58,6 +61,7 @@ class ViewResult:
 
     view: View
     cells: int
+    black_cells: int
     motions: int
     motions_of_parts: int
     reported: int
@@ -73,13 +77,15 @@ class ShotView:
         pose: of the pattern.
         picture: with its covers; ``visible`` are the markers away from them.
         cells: wholly seen colored cells.
-        motions: motions that put them into the pattern, the true one included; 0 without cells.
+        black_cells: wholly seen black and white ones.
+        motions: motions that put the colored ones into the pattern, the true one included; 0 without cells.
         motions_of_parts: motions that put partly seen cells into the pattern, too.
     """
 
     pose: Pose
     picture: CameraPicture
     cells: int
+    black_cells: int
     motions: int
     motions_of_parts: int
 
@@ -87,7 +93,7 @@ class ShotView:
 def shoot_view(view: View) -> ShotView:
     """Shoot and cover a view."""
     rng = np.random.default_rng([view.seed, view.number, KINDS.index(view.kind)])
-    pose = _sample_pose(rng)
+    pose = _sample_pose(view, rng)
     lens = Lens(blur_px=float(rng.uniform(0.6, 1.1)))
     picture = shoot(Chain(pose=pose, lens=lens, sensor=Sensor(), seed=int(rng.integers(2**31))))
     covers = _covers(picture, pose, view.kind, rng)
@@ -96,21 +102,25 @@ def shoot_view(view: View) -> ShotView:
         image=_covered(picture.image, covers, rng),
         visible=picture.visible & ~_are_covered(picture.marker_xy_px, covers),
     )
-    seen = up_cells(picture.layout, seen_cells(picture, covers))
-    pattern = up_cells(picture.layout, colored_cells(picture.layout))
+    cells = colored_cells(picture.layout)
+    seen = up_cells(picture.layout, seen_cells(picture, covers, cells))
+    black = seen_cells(picture, covers, np.setdiff1d(np.arange(len(picture.layout.cell_corners)), cells))
+    pattern = up_cells(picture.layout, cells)
     parts = up_cells(picture.layout, partly_seen_cells(picture, covers))
     motions, of_parts = (fitting_motions(pattern, some) if len(some) else 0 for some in (seen, parts))
-    return ShotView(pose, picture, len(seen), motions, of_parts)
+    return ShotView(pose, picture, len(seen), len(black), motions, of_parts)
 
 
 def read_view(view: View) -> ViewResult:
     """Shoot, cover, and read a view; one thread."""
     cv2.setNumThreads(1)
     shot = shoot_view(view)
-    markers = cached_extractor(shot.pose.pattern, shot.pose.layers, "balanced").extract(shot.picture.image)
+    pose = shot.pose
+    markers = cached_extractor(pose.pattern, pose.layers, "balanced", pose.code).extract(shot.picture.image)
     return ViewResult(
         view=view,
         cells=shot.cells,
+        black_cells=shot.black_cells,
         motions=shot.motions,
         motions_of_parts=shot.motions_of_parts,
         reported=int(markers.status.astype(bool).sum()),
@@ -139,9 +149,10 @@ def up_cells(layout: Layout, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(axial[layout.cell_corners[cells]].min(axis=1), dtype=np.int64)
 
 
-def seen_cells(picture: CameraPicture, covers: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """(K,) the red, green and blue cells that lie wholly in the picture and clear of all covers (H, W), 0: none."""
-    cells = colored_cells(picture.layout)
+def seen_cells(
+    picture: CameraPicture, covers: NDArray[np.uint8], cells: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """(K,) those of some cells (N,) that lie wholly in the picture and clear of all covers (H, W), 0: none."""
     near = cv2.dilate(covers, np.ones((2 * CLEAR_PX + 1,) * 2, np.uint8))
     corners = picture.marker_xy_px[picture.layout.cell_corners[cells]]
     size = np.array(SIZE_PX) - 1
@@ -174,14 +185,15 @@ def _touches(covers: NDArray[np.uint8], triangle: NDArray[np.float64]) -> bool:
     return bool((mask[top:bottom, left:right] & (covers[top:bottom, left:right] > 0)).any())
 
 
-def _sample_pose(rng: np.random.Generator) -> Pose:
+def _sample_pose(view: View, rng: np.random.Generator) -> Pose:
     """A pattern of any size, its middle up to 0.9 of its radius from the picture's."""
-    layers, pitch_px = int(rng.integers(*LAYERS, endpoint=True)), float(rng.uniform(*PITCH_PX))
+    layers, pitch_px = int(rng.integers(*LAYERS, endpoint=True)), float(rng.uniform(*view.pitch_px))
     distance, angle = rng.uniform(0, 0.9) * layers * pitch_px, rng.uniform(0, 2 * np.pi)
     middle = (np.array(SIZE_PX) - 1) / 2 + distance * np.array([np.cos(angle), np.sin(angle)])
     return Pose(
         pattern=str(rng.choice(PATTERNS)),
         layers=layers,
+        code=view.code,
         pitch_px=pitch_px,
         roll_deg=float(rng.uniform(0, 360)),
         tilt_deg=float(rng.uniform(0, 30)),

@@ -8,12 +8,15 @@ from typing import Annotated, Any
 
 import typer
 
+from cmpdesign.api import workshop
 from cmpdesign.cli.command import Command, Group, examples
-from cmpdesign.cli.options.images import PresetOption
+from cmpdesign.cli.derived import derived
+from cmpdesign.cli.options.completions import COMPLETIONS
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, finish, print_warning, printable_path, say
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluation.defaults import USUAL_TRIALS
+from cmpdesign.watch import watched
 
 app = typer.Typer(
     cls=Group,
@@ -27,21 +30,12 @@ app = typer.Typer(
     "report.json. The same command continues an interrupted run.",
 )
 
-Output = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the report and the journal.")
+DesignsArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="DESIGN", help="Templates or TOML files.", autocompletion=COMPLETIONS["designs"]),
 ]
-Seed = Annotated[
-    int, typer.Option(min=0, help="Seed of all random values: the same seed gives the same figures.")
-]
-Workers = Annotated[
-    int | None,
-    typer.Option(min=1, help="Number of processes. [default: one for each core]", show_default=False),
-]
-SensorOption = Annotated[
-    str, typer.Option(metavar="NAME|FILE", help="Simulated sensor: a template's name, or a TOML file.")
-]
-
-
+DesignTrials = Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")]
+OWN: dict[str, None] = dict.fromkeys(("experiment", "designs", "trials"))
 Report = Mapping[str, Any]
 Show = Callable[[Report], Iterator[str]]
 
@@ -73,6 +67,7 @@ def _reliability(report: Report) -> Iterator[str]:
 
 
 def _angles(report: Report) -> Iterator[str]:
+    """Measure how far a single cell can deform or turn before the cell is lost, against eqs. 1 and 2."""
     for name, one in report["cells"].items():
         for what, limit in one.items():
             largest = list(limit["measured"])[-1]
@@ -81,6 +76,7 @@ def _angles(report: Report) -> Iterator[str]:
 
 
 def _designs(report: Report) -> Iterator[str]:
+    """Compare designs on one sensor: error, share measured, smallest feature, laser time."""
     for name, one in report["designs"].items():
         error = one["surface_rms_mm"]["mean"]
         shown = "nothing read" if error is None else f"surface {1000 * error:.1f} um RMS"
@@ -93,20 +89,17 @@ def _designs(report: Report) -> Iterator[str]:
 def _add(name: str, show: Show, trials_text: str, *shown: str) -> None:
     """Add the command of an experiment; ``show`` gives its lines, and its docstring is the help."""
 
-    def command(
-        output: Output,
-        trials: int = USUAL_TRIALS[name],
-        seed: Seed = 0,
-        workers: Workers = None,
-        sensor: SensorOption = "tac3d",
-        preset: PresetOption = "balanced",
-    ) -> None:
-        options = {"trials": trials, "seed": seed, "workers": workers, "sensor": sensor, "preset": preset}
-        _run(name, show, output, **options)
+    def command(output: Path, *, trials: int = USUAL_TRIALS[name], **options: Any) -> None:
+        _run(name, show, output, trials=trials, **options)
 
     command.__annotations__["trials"] = Annotated[int, typer.Option(min=1, help=trials_text)]
-    command.__doc__ = show.__doc__
-    app.command(name, cls=Command, epilog=examples(*shown))(command)
+    _register(command, name, show, shown, **OWN)
+
+
+def _register(command: Any, name: str, show: Show, shown: Sequence[str], **own: None) -> None:
+    ready = derived(workshop.evaluate, "", **own)(command)
+    ready.__doc__ = show.__doc__
+    app.command(name, cls=Command, epilog=examples(*shown))(ready)
 
 
 _add(
@@ -132,39 +125,38 @@ _add(
 )
 
 
-@app.command(
-    cls=Command,
-    epilog=examples(
-        "cmpdesign evaluate angles -o angles",
-        "cmpdesign evaluate angles -o angles --workers 2 --json",
-    ),
+def angles(output: Path, **options: Any) -> None:
+    _run("angles", _angles, output, **options)
+
+
+def designs(
+    output: Path,
+    *,
+    design: DesignsArgument,
+    trials: DesignTrials = USUAL_TRIALS["designs"],
+    **options: Any,
+) -> None:
+    _run("designs", _designs, output, _loaded(design), trials=trials, **options)
+
+
+_register(
+    angles,
+    "angles",
+    _angles,
+    ("cmpdesign evaluate angles -o angles", "cmpdesign evaluate angles -o angles --workers 2 --json"),
+    **OWN,
+    **dict.fromkeys(("seed", "sensor", "preset")),
 )
-def angles(output: Output, workers: Workers = None) -> None:
-    """Measure how far a single cell can deform or turn before the cell is lost, against eqs. 1 and 2."""
-    _run("angles", _angles, output, workers=workers)
-
-
-@app.command(
-    cls=Command,
-    epilog=examples(
+_register(
+    designs,
+    "designs",
+    _designs,
+    (
         "cmpdesign evaluate designs tac3d digit -o compared",
         "cmpdesign evaluate designs mine.toml honeycomb -o compared --trials 1",
     ),
+    **OWN,
 )
-def designs(
-    design: Annotated[list[str], typer.Argument(metavar="DESIGN", help="Templates or TOML files.")],
-    output: Output,
-    trials: Annotated[int, typer.Option(min=1, help="Places and lights for every contact.")] = USUAL_TRIALS[
-        "designs"
-    ],
-    seed: Seed = 0,
-    workers: Workers = None,
-    sensor: SensorOption = "tac3d",
-    preset: PresetOption = "balanced",
-) -> None:
-    """Compare designs on one sensor: error, share measured, smallest feature, laser time."""
-    options = {"trials": trials, "seed": seed, "workers": workers, "sensor": sensor, "preset": preset}
-    _run("designs", _designs, output, _loaded(design), **options)
 
 
 def _loaded(designs: Sequence[str]) -> dict[str, Any]:
@@ -184,12 +176,9 @@ def _loaded(designs: Sequence[str]) -> dict[str, Any]:
 
 def _run(name: Any, show: Show, output: Path, designs: Any = None, **options: Any) -> None:
     """Run an experiment; print the written files and the lines."""
-    from cmpdesign.api.workshop import evaluate
-    from cmpdesign.watch import watched
-
     try:
         with working(name) as steps, watched(steps.tell):
-            found = evaluate(name, output, designs, **options)
+            found = workshop.evaluate(name, output, designs, **options)
     except KeyboardInterrupt:
         print_warning("interrupted; run the same command again to continue")
         raise typer.Exit(EXIT_INTERRUPTED) from None

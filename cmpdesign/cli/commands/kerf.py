@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from cmpdesign.cli.options.images import MaxPixelsOption
-from cmpdesign.cli.options.response import METAVAR, parse_reading_response
+from cmpdesign.api import workshop
+from cmpdesign.cli.derived import derived
 from cmpdesign.cli.terminal import finish, print_step, printable_path, say
-from cmpdesign.inputs.files import MOST_PIXELS
 
 if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.design import Coupon
@@ -22,65 +18,31 @@ if TYPE_CHECKING:
 EXAMPLES = ("cmpdesign kerf coupon.json scan.png", "cmpdesign kerf grid.json photo.jpg --json")
 
 
-class SeenFace(StrEnum):
-    """The face of the sheet whose openings a picture shows."""
-
-    front = "front"
-    back = "back"
-
-
-def kerf(
-    coupon: Annotated[
-        Path, typer.Argument(metavar="COUPON", help="The coupon.json or grid.json that build wrote.")
-    ],
-    photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="A photo or scan of the cut piece.")],
-    face: Annotated[
-        SeenFace | None,
-        typer.Option(
-            help="The face whose openings are seen. [default: the face with the narrower openings, by the "
-            "taper]"
-        ),
-    ] = None,
-    response: Annotated[
-        str | None,
-        typer.Option(
-            metavar=METAVAR,
-            help="Response of the camera. [default: the response in the file, else sRGB, corrected by the edges]",
-        ),
-    ] = None,
-    max_pixels: MaxPixelsOption = MOST_PIXELS,
-) -> None:
-    """Measure the kerf on a cut coupon, or read a grid of settings, and print the lines for the material's file."""
-    from cmpdesign.api import workshop
-    from cmpdesign.documents.reading import KerfDocument
+@derived(workshop.kerf, coupon="the coupon.json or grid.json that build wrote")
+def kerf(coupon: Path, photo: Path, **options: Any) -> None:
+    """A grid of settings is read, too. The lines for the material's file are printed."""
     from cmpdesign.products.laser.coupon.design import load_coupon
 
     cut_coupon = load_coupon(coupon)
     if cut_coupon.kind == "grid":
-        _report_grid(
-            cut_coupon, workshop.laser_grid(coupon, photo, response=parse_reading_response(response)), photo
-        )
+        del options["face"]
+        grid = workshop.laser_grid(coupon, photo, **options)
+        _print_grid(cut_coupon, grid.found, photo)
+        finish(lambda: grid)
         return
-    reading = workshop.kerf(
-        coupon,
-        photo,
-        face=None if face is None else face.value,
-        response=parse_reading_response(response),
-        max_pixels=max_pixels,
-    )
+    found = workshop.kerf(coupon, photo, **options)
     print_step(f"{printable_path(photo)} is read")
+    reading = found.found
     _print_kerf_table(cut_coupon, reading)
     say(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
     for patch_kerf in reading.patches:
         say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
-    finish(lambda: KerfDocument.model_validate(reading.to_json(cut_coupon)))
+    finish(lambda: found)
 
 
-def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
-    """Print a grid's table, and the lines for the material's file; end the command."""
+def _print_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
+    """Print a grid's table, and the lines for the material's file."""
     from rich.table import Table
-
-    from cmpdesign.documents.reading import GridDocument
 
     table = Table(box=None, pad_edge=False)
     counts = sorted({passes for one in reading.fields for passes in one.states})
@@ -98,7 +60,6 @@ def _report_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
             f"\nfor the file of {grid.material}, the settings of {grid.machine}: the quickest with a pass in reserve"
         )
         say(_settings_lines(reading.best, photo.name), soft_wrap=True)
-    finish(lambda: GridDocument.model_validate(reading.to_json()))
 
 
 def _window_text(one: FieldReading, count: int) -> str:

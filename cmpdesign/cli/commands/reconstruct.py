@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api import sequences
 from cmpdesign.cli.derived import derived
-from cmpdesign.cli.options.images import LayoutArgument
 from cmpdesign.cli.run_progress import (
     RecoverOption,
     contact_text,
@@ -18,7 +15,6 @@ from cmpdesign.cli.run_progress import (
     run_and_report,
 )
 from cmpdesign.cli.terminal import say_table
-from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions
 
 if TYPE_CHECKING:
     from cmpdesign.documents.runs import PositionsPart, ReconstructDocument
@@ -27,26 +23,9 @@ EXAMPLES = (
     "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
     "cmpdesign reconstruct layout.json rig.toml 0 press.avi -o run.csv --frames 100",
 )
-ViewsArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="SOURCE",
-        help='A folder of pictures, a pattern such as "run/*.png", a video, a camera\'s number, or rtsp://...; '
-        "one for each view, with commas.",
-    ),
-]
 
 
-@derived(
-    sequences.reconstruct,
-    ShapeOptions,
-    SequenceOptions,
-    layout=LayoutArgument,
-    rig=Path,
-    rest=str,
-    source=ViewsArgument,
-    output=Path,
-)
+@derived(sequences.reconstruct, on_frame=None)
 def reconstruct(
     layout: Path,
     rig: Path,

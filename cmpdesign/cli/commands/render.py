@@ -1,158 +1,147 @@
-"""``cmpdesign render``: renders an image of a pattern with its ground truth."""
+"""``cmpdesign render``: renders a pattern or a scene to an image, a video or a folder, with the ground truth."""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.cli.options.designs import complete_scene
-from cmpdesign.cli.options.paths import require_suffix
-from cmpdesign.cli.options.pixels import parse_pixels
-from cmpdesign.cli.options.response import METAVAR, parse_response
-from cmpdesign.cli.terminal import finish, print_step, printable_path, say
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.api import pictures
+from cmpdesign.cli.derived import derived
+from cmpdesign.cli.progress import working
+from cmpdesign.cli.terminal import finish, print_step, print_warning, printable_path, say
+from cmpdesign.errors import CmpDesignError, parameter
+from cmpdesign.inputs.files import require_suffix
+from cmpdesign.inputs.options import options_of
+from cmpdesign.watch import watched
 
 if TYPE_CHECKING:
     from cmpdesign.scene import Scene
+    from cmpdesign.scene.files.scene_file import SceneFile
 
 EXAMPLES = (
     "cmpdesign render layout.json -o sample.png --pitch 22 --tilt 15 --noise 2",
     "cmpdesign render layout.json -o pressed.png --scene pressed-ball --truth pressed.npz",
 )
-LARGEST_SIDE_PX = 9999
-SCENES = "flat-print, press-and-twist, pressed-ball, tac3d-binocular"
-# Options with a key in a scene file.
-SCENE_FILE_KEYS = {
-    "pitch": "[camera] pitch_px",
-    "rotation": "[camera] rotation_deg",
-    "tilt": "[camera] tilt_deg",
-    "tilt_axis": "[camera] tilt_axis_deg",
-    "mirrored": "[camera] mirrored",
-    "press": "[surface.press] depth_mm",
-    "press_radius": "[surface.press] radius_mm",
-    "blur": "[optics] blur_px",
-    "noise": "[sensor] noise",
-    "response": "[sensor] response",
+SCENE_FILE_TABLES = {
+    "press_mm": "surface.press",
+    "press_radius_mm": "surface.press",
+    "blur_px": "optics",
+    "noise": "sensor",
+    "response": "sensor",
 }
+SCENE_FILE_KEYS = {
+    "press_mm": "depth_mm",
+    "press_radius_mm": "radius_mm",
+}  # the others have the option's name
+OutputOption = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="IMAGE",
+        help="Image (.png, .tif, .bmp, .webp, .jpg); of a sequence a video (.mp4, .avi, .mkv) or a folder.",
+    ),
+]
+TruthOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="NPZ file for the markers' true places.")
+]
 
 
-def require_finite(option: typer.CallbackParam, value: float | None) -> float | None:
-    """Check that the value of an option is finite: the parser accepts "nan" and "inf".
-
-    Raises:
-        CmpDesignError: a value that is not finite.
-    """
-    if value is not None and not math.isfinite(value):
-        raise CmpDesignError(f"{option.opts[0]} is {value}; expected a finite number")
-    return value
-
-
+@derived(pictures.render)
 def render(
-    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")],
+    layout: Path,
+    scene: Path | None,
+    size: tuple[int, int] | None,
+    seed: int | None,
+    *,
     ctx: typer.Context,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="IMAGE",
-            help="Image (.png, .tif, .bmp, .webp, .jpg); of a sequence a video (.mp4, .avi, .mkv) or a folder.",
-        ),
-    ],
-    scene: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help=f"Scene TOML, or the name of a scene template: {SCENES}.",
-            autocompletion=complete_scene,
-        ),
-    ] = None,
-    truth: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="NPZ file for the markers' true places.")
-    ] = None,
-    size: Annotated[str, typer.Option(metavar="WxH", help="Image size in pixels.")] = "640x480",
-    pitch: Annotated[
-        float, typer.Option(callback=require_finite, help="Pixels from marker to marker.")
-    ] = 20.0,
-    rotation: Annotated[
-        float, typer.Option(callback=require_finite, help="Counter-clockwise turn in the image, degrees.")
-    ] = 0.0,
-    tilt: Annotated[
-        float, typer.Option(callback=require_finite, help="Tilt out of the image plane, degrees.")
-    ] = 0.0,
-    tilt_axis: Annotated[
-        float, typer.Option(callback=require_finite, help="Direction of the tilt's axis, degrees.")
-    ] = 0.0,
-    mirrored: Annotated[
-        bool | None,
-        typer.Option(
-            "--mirrored/--front",
-            help="Side of the pattern that the camera sees: the back or the front. [default: as designed]",
-        ),
-    ] = None,
-    press: Annotated[
-        float,
-        typer.Option(
-            callback=require_finite, help="Largest displacement of the markers by a press at the centre, mm."
-        ),
-    ] = 0.0,
-    press_radius: Annotated[
-        float | None,
-        typer.Option(
-            callback=require_finite, help="Radius of the press, mm. [default: a quarter of the pattern]"
-        ),
-    ] = None,
-    blur: Annotated[
-        float, typer.Option(callback=require_finite, help="Gaussian blur, sigma in pixels.")
-    ] = 1.0,
-    noise: Annotated[
-        float, typer.Option(callback=require_finite, help="Noise, standard deviation in 255ths.")
-    ] = 0.0,
-    response: Annotated[
-        str,
-        typer.Option(
-            metavar=METAVAR,
-            help="Response of the camera; with an exponent, light is value ** exponent.",
-        ),
-    ] = "srgb",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    output: OutputOption,
+    truth: TruthOption = None,
+    **view: Any,
 ) -> None:
-    """Render a pattern as a camera sees the pattern. The picture is seeded, and exact to a thousandth of a pixel."""
+    """With a sequence as the scene, a video or a folder of pictures is written."""
+    require_suffix("truth", truth, ".npz")
     if scene is not None:
-        from cmpdesign.cli.commands.render_scene import render_scene_file
-
-        given = _given_options(ctx)
-        pixels = parse_pixels("--size", size, LARGEST_SIDE_PX) if "size" in given else None
-        render_scene_file(layout, scene, output, truth, pixels, seed if "seed" in given else None)
+        _refuse_with_scene(ctx)
+        file = pictures.load_scene(scene, layout, size, seed)
+        if file.fps is not None:
+            _render_sequence(file, output, truth)
+            return
+        _render_picture(file.scene(), file.size_px, output, truth, bits=file.bits, is_of_file=True)
         return
-    from cmpdesign.api.pictures import plain_scene
-    from cmpdesign.files.images import require_image_kind
-
-    pixels = parse_pixels("--size", size, LARGEST_SIDE_PX)
-    require_image_kind(output, 8)
-    require_suffix("--truth", truth, [".npz"])
     with _option_names_in_errors():
-        pattern_scene = plain_scene(
-            layout,
-            seed,
-            pitch_px=pitch,
-            rotation_deg=rotation,
-            tilt_deg=tilt,
-            tilt_axis_deg=tilt_axis,
-            mirrored=mirrored,
-            press_mm=press,
-            press_radius_mm=press_radius,
-            blur_px=blur,
-            noise=noise,
-            response=parse_response(response),
-        )
-    _write_rendered(pattern_scene, pixels, output, truth)
+        plain = pictures.plain_scene(layout, seed or 0, **view)
+    _render_picture(plain, size or pictures.SIZE_PX, output, truth)
+
+
+def _render_picture(
+    scene: Scene,
+    size_px: tuple[int, int],
+    output: Path,
+    truth: Path | None,
+    *,
+    bits: int = 8,
+    is_of_file: bool = False,
+) -> None:
+    """Render a scene of (width, height) pixels; write the image and, if asked for, the truth."""
+    import numpy as np
+
+    from cmpdesign.files.atomic import write_file
+    from cmpdesign.files.images import encode_image, require_image_kind
+    from cmpdesign.scene import render as render_scene
+    from cmpdesign.scene import save_truth
+
+    try:
+        require_image_kind(output, bits)
+    except CmpDesignError as error:
+        raise CmpDesignError(f"{error} (the scene has no [sequence])" if is_of_file else str(error)) from None
+    rendered = render_scene(scene, size=size_px)
+    print_step("the image is rendered")
+    for warning in rendered.warnings:
+        print_warning(warning)
+    if truth is not None:
+        save_truth(rendered.truth, truth)
+    write_file(output, encode_image(rendered.image, output))
+    visible = tuple(np.atleast_2d(rendered.truth.visible).sum(axis=1).tolist())
+    of_views = f" in {len(visible)} views" if rendered.truth.visible.ndim > 1 else ""
+    words = f"{size_px[0]} x {size_px[1]} px, {' + '.join(map(str, visible))} markers visible{of_views}"
+    _finish(output, truth, words, size_px=size_px, frames=1, fps=None, visible=visible)
+
+
+def _render_sequence(file: SceneFile, output: Path, truth: Path | None) -> None:
+    from cmpdesign.scene.files.sequence import write_sequence
+
+    with working("rendering") as steps, watched(steps.tell):
+        warnings = write_sequence(file, output, truth)
+    kinds: dict[str, str] = {}  # by letters, without numbers: the first frame of each kind
+    for text, frame in warnings.items():
+        kind = "".join(letter for letter in text if letter.isalpha())
+        kinds.setdefault(kind, f"from frame {frame} ({file.time_s(frame):.3g} s) on: {text}")
+    for text in kinds.values():
+        print_warning(text)
+    words = f"{file.frames} frames of {file.size_px[0]} x {file.size_px[1]} px at {file.fps:g} fps"
+    _finish(output, truth, words, size_px=file.size_px, frames=file.frames, fps=file.fps, visible=None)
+
+
+def _finish(output: Path, truth: Path | None, words: str, **fields: Any) -> None:
+    """Print the written files."""
+    from cmpdesign.documents.runs import RenderDocument
+
+    if truth is not None:
+        say(f"wrote {printable_path(truth)}")
+    say(f"wrote {printable_path(output)}: {words}")
+    written = tuple(str(path) for path in (truth, output) if path is not None)
+    finish(lambda: RenderDocument(written=written, **fields))
+
+
+def _view_options() -> Mapping[str, str]:
+    """Key of a view -> its option."""
+    return {one.name: one.usual.name or f"--{one.name}" for one in options_of(pictures.ViewOptions)}
 
 
 @contextmanager
@@ -164,50 +153,22 @@ def _option_names_in_errors() -> Iterator[None]:
         yield
     except SceneError as error:
         text = str(error)
-        for name, key in SCENE_FILE_KEYS.items():
-            option, field = f"--{name.replace('_', '-')}", key.rpartition(" ")[2]
-            text = re.sub(rf"^{field}(?= is )", option, text)
+        for name, option in _view_options().items():
+            text = re.sub(rf"^{SCENE_FILE_KEYS.get(name, name)}(?= is )", option, text)
         raise CmpDesignError(text) from None
 
 
-def _write_rendered(scene: Scene, pixels: tuple[int, int], output: Path, truth: Path | None) -> None:
-    """Render a scene of (width, height) pixels; write the image and, if asked for, the truth."""
-    from cmpdesign.documents.runs import RenderDocument
-    from cmpdesign.files.atomic import write_file
-    from cmpdesign.files.images import encode_image
-    from cmpdesign.scene import render as render_scene
-    from cmpdesign.scene import save_truth
-
-    rendered = render_scene(scene, size=pixels)
-    print_step("the image is rendered")
-    if truth is not None:
-        save_truth(rendered.truth, truth)
-        say(f"wrote {printable_path(truth)}")
-    write_file(output, encode_image(rendered.image, output))
-    visible = int(rendered.truth.visible.sum())
-    say(f"wrote {printable_path(output)}: {pixels[0]} x {pixels[1]} px, {visible} markers visible")
-    finish(
-        lambda: RenderDocument(
-            written=tuple(printable_path(path) for path in (truth, output) if path is not None),
-            size_px=pixels,
-            frames=1,
-            fps=None,
-            visible=(visible,),
-        )
-    )
-
-
-def _given_options(ctx: typer.Context) -> set[str]:
-    """The names of the options on the command line, for use with a scene file.
+def _refuse_with_scene(ctx: typer.Context) -> None:
+    """Check that no option is given that has a key in scene files.
 
     Raises:
-        CmpDesignError: an option with a key in scene files.
+        CmpDesignError: such an option.
     """
-    sources = {name: ctx.get_parameter_source(name) for name in ctx.params}
-    given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
-    for name in sorted(given & SCENE_FILE_KEYS.keys()):
-        option = "--front or --mirrored" if name == "mirrored" else f"--{name.replace('_', '-')}"
-        raise CmpDesignError(
-            f"{option} cannot be given with --scene; write {SCENE_FILE_KEYS[name]} into the file"
-        )
-    return given
+    for name, option in sorted(_view_options().items()):
+        source = ctx.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            words = "--front or --mirrored" if name == "mirrored" else option
+            key = f"[{SCENE_FILE_TABLES.get(name, 'camera')}] {SCENE_FILE_KEYS.get(name, name)}"
+            raise CmpDesignError(
+                f"{words} cannot be given with {parameter('scene')}; write {key} into the file"
+            )

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from cmpdesign.cli.options.paths import require_suffix
-from cmpdesign.cli.terminal import finish, printable_path, say, say_text
+from cmpdesign.cli.terminal import finish, printable_path, say, say_table, say_text
+from cmpdesign.inputs.files import require_suffix
 
 EXAMPLES = (
     "cmpdesign size --camera 1280x960 --view 24x18mm",
@@ -44,16 +44,11 @@ def size(
     from cmpdesign.files.atomic import write_file
     from cmpdesign.proposal import camera_design
 
-    require_suffix("--output", output, [".toml"])
+    require_suffix("output", output, ".toml")
     proposal = camera_design.size(camera, view, error, blur_px=blur, noise=noise, make=make)
     if output is not None:
         write_file(output, proposal.to_toml())
-    from rich.table import Table
-
-    table = Table(box=None, show_header=False, pad_edge=False)
-    for name, value in proposal.figures().items():
-        table.add_row(name, value)
-    say(table)
+    say_table(proposal.figures())
     if output is not None:
         say(f"wrote {printable_path(output)}")
         say_text(f"next: {proposal.next_command(shlex.quote(str(output)))}\n")

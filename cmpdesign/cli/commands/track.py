@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api import sequences
 from cmpdesign.cli.derived import derived
-from cmpdesign.cli.options.images import LayoutArgument, SourcesArgument
 from cmpdesign.cli.run_progress import (
     RecoverOption,
     contact_text,
@@ -16,7 +15,6 @@ from cmpdesign.cli.run_progress import (
     run_and_report,
 )
 from cmpdesign.cli.terminal import print_warning, printable_path, say_table
-from cmpdesign.tracking.jobs.options import SequenceOptions, TrackOptions
 
 if TYPE_CHECKING:
     from cmpdesign.documents.runs import TrackDocument
@@ -27,9 +25,7 @@ EXAMPLES = (
 )
 
 
-@derived(
-    sequences.track, TrackOptions, SequenceOptions, layout=LayoutArgument, source=SourcesArgument, output=Path
-)
+@derived(sequences.track, on_frame=None)
 def track(
     layout: Path, source: list[str], output: Path, *, recover: RecoverOption = False, **options: Any
 ) -> None:

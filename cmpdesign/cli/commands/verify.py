@@ -14,14 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from cmpdesign.cli.options.images import (
-    ChannelsOption,
-    MaxPixelsOption,
-    PresetOption,
-    SourcesArgument,
-)
-from cmpdesign.cli.options.paths import require_suffix
-from cmpdesign.cli.options.response import METAVAR, READING_HELP, parse_reading_response
+from cmpdesign.api import pictures
+from cmpdesign.cli.derived import derived
+from cmpdesign.cli.options.images import SourcesArgument
 from cmpdesign.cli.progress import progress_bar
 from cmpdesign.cli.terminal import (
     EXIT_BAD_INPUT,
@@ -33,10 +28,9 @@ from cmpdesign.cli.terminal import (
     say_text,
 )
 from cmpdesign.errors import InputError, parameter
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import read_text, require_suffix
 
 if TYPE_CHECKING:
-    from cmpdesign.api.pictures import Verifier
     from cmpdesign.documents.reading import VerifyDocument
     from cmpdesign.files.images import Image
     from cmpdesign.products.sheet.verdict import SheetVerdict
@@ -52,86 +46,78 @@ EXAMPLES = (
 EXIT_NOT_VERIFIED = 1
 
 
+LayoutsArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="LAYOUT...",
+        help="The pattern's layout.json; or those of several pads with different codes: pictures show any one of them.",
+    ),
+]
+OutputOption = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
+]
+DebugOption = Annotated[Path | None, typer.Option(help="Folder for a picture of every stage.")]
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Bundle for a report of a problem, .zip: the pictures as they are, EXIF included, the layout, settings, "
+        "versions and the stages.",
+    ),
+]
+FramesOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Read this many frames of each video, camera or stream. [default: all of a video, one of a camera or "
+        "stream]",
+    ),
+]
+BitsOption = Annotated[
+    int | None,
+    typer.Option(
+        min=8,
+        max=16,
+        help="Bits of the camera's values in pictures of 16 bits. [default: found from the values]",
+    ),
+]
+
+
+@derived(pictures.verify, layout=None, image=None, report=None)
 def verify(
-    layout: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LAYOUT...",
-            help="The pattern's layout.json; or those of several pads with different codes: pictures show any "
-            "one of them.",
-        ),
-    ],
+    *,
+    layout: LayoutsArgument,
     images: SourcesArgument,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for overlay pictures and verify.json.")
-    ] = None,
-    debug: Annotated[Path | None, typer.Option(help="Folder for a picture of every stage.")] = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Bundle for a report of a problem, .zip: the pictures as they are, EXIF included, the layout, "
-            "settings, versions and the stages.",
-        ),
-    ] = None,
-    min_share: Annotated[
-        float, typer.Option(min=0, max=1, help="Share of the visible markers that must be measured.")
-    ] = 0.9,
-    sheet_dpi: Annotated[
-        float | None,
-        typer.Option(
-            min=0,
-            help="The pictures are print sheets of this resolution (0: unknown); the files' own resolution is "
-            "ignored.",
-        ),
-    ] = None,
-    frames: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Read this many frames of each video, camera or stream. [default: all of a video, one of a camera or "
-            "stream]",
-        ),
-    ] = None,
-    bits: Annotated[
-        int | None,
-        typer.Option(
-            min=8,
-            max=16,
-            help="Bits of the camera's values in pictures of 16 bits. [default: found from the values]",
-        ),
-    ] = None,
-    preset: PresetOption = "balanced",
-    response: Annotated[str | None, typer.Option(metavar=METAVAR, help=READING_HELP)] = None,
-    channels: ChannelsOption = "bgr",
-    max_pixels: MaxPixelsOption = MOST_PIXELS,
+    output: OutputOption = None,
+    debug: DebugOption = None,
+    report: ReportOption = None,
+    frames: FramesOption = None,
+    bits: BitsOption = None,
+    **options: Any,
 ) -> None:
-    """Extract pictures and check the numbering. Exit code: 0 verified, 1 not verified, 2 bad input."""
-    from cmpdesign.api.pictures import Verifier
+    """Many pictures, videos and cameras are read, too. Exit code: 0 verified, 1 not verified, 2 bad input."""
     from cmpdesign.inputs.sources import name_sources
     from cmpdesign.tracking.source_images import count_images, source_images
     from cmpdesign.tracking.sources import Reading
     from extractor.layout.layout_file import layouts_of
 
-    require_suffix("--report", report, [".zip"])
+    require_suffix("report", report, ".zip")
     layouts = [layout, *(Path(text) for text in takewhile(_is_layout, images))]
     if report is not None and len(layouts) > 1:
         raise InputError(
             f"{parameter('report')} bundles one layout, and {len(layouts)} are given; give the pad's"
         )
-    family, known = layouts_of(layouts), parse_reading_response(response)
-    judge = Verifier(family, min_share, known, channels, sheet_dpi, max_pixels, preset)
-    bundle = None
-    if report is not None:
-        bundle = _new_report(layout, _Settings(preset, response, channels, min_share))
+    family = layouts_of(layouts)
+    judge = pictures.Verifier(family, **options)
+    bundle = pictures.new_report(judge, read_text(layout)) if report is not None else None
     verifier = _ImageVerifier(judge, _Folders(output, debug), bundle)
     sources = name_sources(images[len(layouts) - 1 :])
     outcomes = []
     with progress_bar("verifying", count_images(sources, frames), unit="pictures") as advance:
-        for image in source_images(sources, frames, Reading(max_pixels=max_pixels, bits=bits)):
+        for image in source_images(sources, frames, Reading(max_pixels=judge.max_pixels, bits=bits)):
             outcomes.append(verifier.verify_image(image))
             advance("")
-    document = _to_document(family, outcomes, min_share)
+    document = _to_document(family, outcomes, judge.min_share)
     if output is not None:
         from cmpdesign.files.atomic import write_file
 
@@ -157,22 +143,6 @@ class _Folders(NamedTuple):
     debug: Path | None
 
 
-class _Settings(NamedTuple):
-    """The options of the reading, as written into a report."""
-
-    preset: str
-    response: str | None
-    channels: str
-    min_share: float
-
-
-def _new_report(layout: Path, settings: _Settings) -> ProblemReport:
-    from cmpdesign.inputs.files import read_text
-    from cmpdesign.reading.problem_report import ProblemReport
-
-    return ProblemReport(read_text(layout), settings._asdict())
-
-
 @dataclass(frozen=True)
 class Outcome:
     """The result of one image.
@@ -192,7 +162,7 @@ class Outcome:
 class _ImageVerifier:
     """Verifies images, and writes their pictures and the report of a problem."""
 
-    judge: Verifier
+    judge: pictures.Verifier
     folders: _Folders
     bundle: ProblemReport | None
 
@@ -252,8 +222,8 @@ def _write_pictures(
     if folders.debug is not None:
         from extractor.draw import draw_stages
 
-        pictures = draw_stages(image, reference, verdict.markers)
-        for number, (stage, picture) in enumerate(pictures.items(), start=1):
+        drawn = draw_stages(image, reference, verdict.markers)
+        for number, (stage, picture) in enumerate(drawn.items(), start=1):
             write_file(folders.debug / f"{name}.{number}-{stage}.png", to_png(picture))
 
 

@@ -129,11 +129,19 @@ def tidy_fps(fps: float) -> float:
     return whole if whole and abs(fps - whole) < WHOLE_FPS * whole else round(fps, 3)
 
 
-def largest_shift_s(run: Run, fps: float) -> float:
-    """The largest difference of a frame's time from that of an even rate, s."""
-    even_s = np.arange(len(run)) / fps
-    late_s = run.arrays["time_s"] - run.arrays["time_s"][0] - even_s
-    return float(np.nanmax(np.abs(late_s), initial=0.0))
+def uneven_times(runs: Sequence[Path], fps: float) -> tuple[str, ...]:
+    """A sentence on each run whose times differ by more than half a frame from an even rate."""
+    found = []
+    for path in runs:
+        times_s = read_run(path).arrays["time_s"]
+        late_s = times_s - times_s[0] - np.arange(len(times_s)) / fps
+        shift_s = float(np.nanmax(np.abs(late_s), initial=0.0))
+        if shift_s > 0.5 / fps:
+            found.append(
+                f"{path}: the times differ by up to {shift_s:.3g} s from {fps:g} frames per second; "
+                "observation.tactile.time_s holds the times of the run"
+            )
+    return tuple(found)
 
 
 def _kind_of(path: Path) -> RunKind:

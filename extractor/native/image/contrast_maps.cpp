@@ -15,7 +15,7 @@ constexpr Index CHANNELS = 3;
 struct Mix {
   std::int32_t blue, green, red, divisor, offset;
 };
-constexpr std::array<Mix, CONTRAST_MAPS> MIXES{{{1, 0, 0, 1, 0},
+constexpr std::array<Mix, 7> MIXES{{{1, 0, 0, 1, 0},
                                                 {0, 1, 0, 1, 0},
                                                 {0, 0, 1, 1, 0},
                                                 {1, 1, 1, 3, 0},
@@ -59,6 +59,13 @@ CMP_PART_OF_LOOP void fill_mixed(View<const std::uint8_t, 1> blue, View<const st
     const std::int32_t sum = mix.blue * blue[i] + mix.green * green[i] + mix.red * red[i];
     out[i] = static_cast<std::uint8_t>(((sum * factor) >> 16) + mix.offset);
   }
+}
+
+CMP_PART_OF_LOOP void fill_over_least(View<const std::uint8_t, 1> blue, View<const std::uint8_t, 1> green,
+                                      View<const std::uint8_t, 1> red, View<const std::uint8_t, 1> own,
+                                      View<std::uint8_t, 1> out) {
+  for (Index i = 0; i < out.size(); ++i)
+    out[i] = static_cast<std::uint8_t>(own[i] - std::min({blue[i], green[i], red[i]}));
 }
 
 CMP_PART_OF_LOOP std::uint8_t least_of(View<const std::uint8_t, 1> values) {
@@ -142,7 +149,12 @@ ContrastMap contrast_map(View<const std::uint8_t, 3> channels, Index number, Ind
   const Index rows = (height + tile_px - 1) / tile_px, columns = (width + tile_px - 1) / tile_px;
   ContrastMap out{Array<std::uint8_t, 2>({height, width}), Array<float, 2>({rows, columns}),
                   Array<float, 2>({rows, columns}), tile_px};
-  fill_mixed(channels[0].flat(), channels[1].flat(), channels[2].flat(), MIXES[number], out.value.flat());
+  const auto blue = channels[0].flat(), green = channels[1].flat(), red = channels[2].flat();
+  if (number < static_cast<Index>(MIXES.size()))
+    fill_mixed(blue, green, red, MIXES[number], out.value.flat());
+  else
+    fill_over_least(blue, green, red, channels[number - static_cast<Index>(MIXES.size())].flat(),
+                    out.value.flat());
   fill_tile_levels(out.value, tile_px, out.low, out.high);
   const auto as_is = [](float value, float) { return value; };
   const auto sum = [](float a, float b) { return a + b; };

@@ -5,8 +5,9 @@
 
 namespace cmp::image {
 
-// Each channel; the sum of the channels; each channel over the mean of the others.
-inline constexpr Index CONTRAST_MAPS = 7;
+// Each channel; the sum of the channels; each channel over the mean of the others; each channel over
+// the least one.
+inline constexpr Index CONTRAST_MAPS = 10;
 
 // A map with its local levels at the middles of tiles.
 struct ContrastMap {

@@ -60,14 +60,95 @@ class AxialPlaces {
   Array<std::int32_t, 2> lookup_;
 };
 
-// The number of places inside the layout after a shift; -1 where more than `most` lie outside.
-std::int64_t count_inside(const std::vector<AxialStep>& places, std::int32_t dq, std::int32_t dr,
-                          std::int64_t most, View<const std::int32_t, 2> cell_lookup) {
-  std::int64_t outside = 0;
-  for (const AxialStep& a : places)
-    if (layout::cell_at(cell_lookup, a.q + dq, a.r + dr) < 0 && ++outside > most) return -1;
-  return static_cast<std::int64_t>(places.size()) - outside;
+// A rectangle of axial places with a value at each; shifted places are read without a test.
+template <class Value>
+class AxialTable {
+ public:
+  AxialTable(Extent q, Extent r, Value none) : q_(q.low), r_(r.low), columns_(r.high - r.low + 1) {
+    values_.assign(static_cast<std::size_t>((q.high - q.low + 1) * columns_), none);
+  }
+  std::ptrdiff_t index_of(AxialStep a) const { return (a.q - q_) * columns_ + a.r - r_; }
+  std::ptrdiff_t step_of(std::int32_t dq, std::int32_t dr) const { return dq * columns_ + dr; }
+  Value& operator[](std::ptrdiff_t index) { return values_[static_cast<std::size_t>(index)]; }
+  Value operator[](std::ptrdiff_t index) const { return values_[static_cast<std::size_t>(index)]; }
+
+ private:
+  std::ptrdiff_t q_, r_, columns_;
+  std::vector<Value> values_;
+};
+
+Extent together(Extent a, Extent b) { return {std::min(a.low, b.low), std::max(a.high, b.high)}; }
+
+Extent extent_of(const std::vector<AxialStep>& places, int axis) {
+  return places.empty() ? Extent{0, 0} : trimmed_extent(places, axis, 0.0);
 }
+
+std::vector<AxialStep> steps_of(View<const std::int32_t, 2> axial) {
+  std::vector<AxialStep> out;
+  out.reserve(static_cast<std::size_t>(axial.size()));
+  for (Index n = 0; n < axial.size(); ++n) out.push_back({axial(n, 0), axial(n, 1)});
+  return out;
+}
+
+// A part that was turned, before shifts.
+struct TurnedPart {
+  std::vector<AxialStep> cells, down;
+};
+
+// Scores the shifts of a turned part.
+class Shifts {
+ public:
+  // Shifts are within dq and dr. white (D,) of the part's down-cells.
+  Shifts(const TurnedPart& part, View<const double, 1> white, const std::vector<AxialStep>& layout,
+         const std::vector<AxialStep>& layout_white, Extent dq, Extent dr)
+      : is_cell_(together(extent_of(layout, 0), shifted(extent_of(part.cells, 0), dq, 1)),
+                 together(extent_of(layout, 1), shifted(extent_of(part.cells, 1), dr, 1)), 0),
+        odds_(together(extent_of(part.down, 0), shifted(extent_of(layout_white, 0), dq, -1)),
+              together(extent_of(part.down, 1), shifted(extent_of(layout_white, 1), dr, -1)), {0.0, 0}) {
+    for (const AxialStep& a : layout) is_cell_[is_cell_.index_of(a)] = 1;
+    for (const AxialStep& a : part.cells) cell_.push_back(is_cell_.index_of(a));
+    for (Index n = 0; n < white.size(); ++n)
+      if (!std::isnan(white[n])) odds_[odds_.index_of(part.down[static_cast<std::size_t>(n)])] = {white[n], 1};
+    for (const AxialStep& a : layout_white) white_.push_back(odds_.index_of(a));
+  }
+  // The number of cells outside the layout; -1 for more than `most`.
+  std::int64_t count_outside(std::int32_t dq, std::int32_t dr, std::int64_t most) const {
+    const auto step = is_cell_.step_of(dq, dr);
+    std::int64_t outside = 0;
+    for (const std::ptrdiff_t at : cell_)
+      if (!is_cell_[at + step] && ++outside > most) return -1;
+    return outside;
+  }
+  // Fills in the log odds of the known white places of each pad, and their numbers.
+  void fill_white(std::int32_t dq, std::int32_t dr, View<const std::int32_t, 1> pad, std::vector<double>& odds,
+                 std::vector<std::int32_t>& known) const {
+    const auto step = odds_.step_of(dq, dr);
+    const auto count = static_cast<Index>(white_.size());
+    for (Index w = 0; w < count;) {
+      const std::int32_t own = pad[w];
+      KnownOdds sum{0.0, 0};
+      for (; w < count && pad[w] == own; ++w) {
+        const KnownOdds one = odds_[white_[static_cast<std::size_t>(w)] - step];
+        sum.odds += one.odds, sum.known += one.known;
+      }
+      odds[own] = sum.odds, known[own] = sum.known;
+    }
+  }
+
+ private:
+  struct KnownOdds {
+    double odds;
+    std::int32_t known;
+  };
+  static Extent shifted(Extent places, Extent by, std::int32_t sign) {
+    return sign > 0 ? Extent{places.low + by.low, places.high + by.high}
+                    : Extent{places.low - by.high, places.high - by.low};
+  }
+
+  AxialTable<std::uint8_t> is_cell_;
+  AxialTable<KnownOdds> odds_;
+  std::vector<std::ptrdiff_t> cell_, white_;
+};
 
 // The best motions, the best first; of equal ones the first.
 Motions best_motions(std::vector<ScoredMotion> found, Index most) {
@@ -102,14 +183,11 @@ Motions best_motions(std::vector<ScoredMotion> found, Index most) {
 Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> naming,
                       View<const std::int32_t, 2> white_axial, View<const double, 1> white,
                       const RegisteredLayout& layout, const WitnessLimits& limits) {
-  const AxialPlaces places(white_axial);
   const auto most =
       std::max(limits.min_outside,
                static_cast<std::int64_t>(limits.max_outside_share * static_cast<double>(axial.size())));
-  std::vector<AxialStep> cells, of_layout;
-  for (Index i = 0; i < axial.size(); ++i) cells.push_back({axial(i, 0), axial(i, 1)});
-  for (Index u = 0; u < layout.axial.size(); ++u)
-    of_layout.push_back({layout.axial(u, 0), layout.axial(u, 1)});
+  const auto cells = steps_of(axial), down = steps_of(white_axial), of_layout = steps_of(layout.axial),
+             layout_white = steps_of(layout.white_axial);
   std::array<Extent, 3> allowed;
   for (int axis = 0; axis < 3; ++axis) allowed[axis] = trimmed_extent(of_layout, axis, 0.0);
   std::vector<ScoredMotion> found;
@@ -117,27 +195,26 @@ Motions register_part(View<const std::int32_t, 2> axial, View<const double, 1> n
   std::vector<double> odds(pads);
   std::vector<std::int32_t> known(pads);
   for (std::int32_t turn = 0; turn < TURNS; ++turn) {
-    std::vector<AxialStep> turned;
-    for (const AxialStep& a : cells) turned.push_back(turned_up(a, turn));
+    TurnedPart part;
+    for (const AxialStep& a : cells) part.cells.push_back(turned_up(a, turn));
+    for (const AxialStep& a : down) part.down.push_back(turned_down(a, turn));
     std::array<Extent, 3> own;
-    for (int axis = 0; axis < 3; ++axis) own[axis] = trimmed_extent(turned, axis, limits.trimmed_share);
-    for (std::int32_t dq = allowed[0].low - own[0].low; dq <= allowed[0].high - own[0].high; ++dq)
-      for (std::int32_t dr = allowed[1].low - own[1].low; dr <= allowed[1].high - own[1].high; ++dr) {
+    for (int axis = 0; axis < 3; ++axis)
+      own[axis] = trimmed_extent(part.cells, axis, limits.trimmed_share);
+    const Extent q{allowed[0].low - own[0].low, allowed[0].high - own[0].high},
+        r{allowed[1].low - own[1].low, allowed[1].high - own[1].high};
+    if (q.high < q.low || r.high < r.low) continue;
+    const Shifts shifts(part, white, of_layout, layout_white, q, r);
+    for (std::int32_t dq = q.low; dq <= q.high; ++dq)
+      for (std::int32_t dr = r.low; dr <= r.high; ++dr) {
         if (own[2].low + dq + dr < allowed[2].low || own[2].high + dq + dr > allowed[2].high) continue;
-        const std::int64_t inside = count_inside(turned, dq, dr, most, layout.cell_lookup);
-        if (inside < 0) continue;
+        const std::int64_t outside = shifts.count_outside(dq, dr, most);
+        if (outside < 0) continue;
         const Motion motion{turn, dq, dr};
-        std::fill(odds.begin(), odds.end(), 0.0);
-        std::fill(known.begin(), known.end(), 0);
-        for (Index w = 0; w < layout.white_axial.size(); ++w) {
-          const std::int32_t place =
-              places.number_at(moved_back_down({layout.white_axial(w, 0), layout.white_axial(w, 1)}, motion));
-          if (place < 0 || std::isnan(white[place])) continue;
-          odds[layout.white_pad[w]] += white[place], ++known[layout.white_pad[w]];
-        }
+        shifts.fill_white(dq, dr, layout.white_pad, odds, known);
         const Index shift = class_of(moved_up(cells[0], motion)) - class_of(cells[0]);
-        const double others = naming[((shift % 3) + 3) % 3] -
-                              limits.outside_weight * static_cast<double>(axial.size() - inside);
+        const double others =
+            naming[((shift % 3) + 3) % 3] - limits.outside_weight * static_cast<double>(outside);
         for (std::int32_t pad = 0; pad < pads; ++pad)
           found.push_back({pad, motion, others + odds[pad], odds[pad], known[pad]});
       }

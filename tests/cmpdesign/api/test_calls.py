@@ -202,7 +202,7 @@ def test_render_draws_what_the_command_draws(design: cmpdesign.Design, tmp_path:
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     with np.load(tmp_path / "a.npz") as a, np.load(tmp_path / "b.npz") as b:
         assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.files)
-    with pytest.raises(TypeError, match="pitch is no property of a view; there are pitch_px"):
+    with pytest.raises(TypeError, match="pitch is no option; there are pitch_px"):
         cmpdesign.render(design.layout, pitch=25)  # type: ignore[call-arg]
     with pytest.raises(cmpdesign.CmpDesignError, match="pitch_px cannot be given with a scene"):
         cmpdesign.render(design.layout, "pressed-ball", pitch_px=25)

@@ -68,7 +68,7 @@ def test_bad_input_is_one_line(folder: Path, tmp_path: Path) -> None:
         cmpdesign.calibrate_camera(folder / "layout.json", [picture, cv2.resize(picture, (640, 480))])
     with pytest.raises(cmpdesign.CmpDesignError, match="no picture shows the sheet: picture 1: "):
         cmpdesign.calibrate_camera(folder / "layout.json", [np.zeros_like(picture)])
-    with pytest.raises(cmpdesign.CmpDesignError, match=r"camera\.json: unknown ending of a camera file"):
+    with pytest.raises(cmpdesign.CmpDesignError, match=r"camera\.json': unknown ending; expected \.toml"):
         cmpdesign.calibrate_camera(folder / "layout.json", [picture], tmp_path / "camera.json")
     with pytest.raises(cmpdesign.CmpDesignError, match="1 pictures show the sheet; a calibration needs 3"):
         cmpdesign.calibrate_camera(folder / "layout.json", [picture])

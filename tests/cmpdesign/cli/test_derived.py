@@ -40,6 +40,21 @@ def test_a_command_has_the_options_of_its_call(name: str, record: Any) -> None:
         assert taken[option.name].help[:1].strip()
 
 
+@pytest.mark.parametrize(
+    "words", ["build", "check", "extract", "calibrate pattern", "calibrate rig", "export lerobot", "kerf"]
+)
+def test_a_command_has_the_parameters_and_defaults_of_its_call(words: str) -> None:
+    command: Any = get_command(app)
+    for word in words.split():
+        command = command.commands[word]
+    taken = {each.name: each for each in command.params}
+    for each in inspect.signature(getattr(cmpdesign, words.replace(" ", "_"))).parameters.values():
+        if each.kind is not each.VAR_KEYWORD and each.name != "output":
+            assert taken[each.name].required == (each.default is each.empty), each.name
+            if isinstance(each.default, int | float | str):
+                assert taken[each.name].default == each.default
+
+
 class More(TypedDict, total=False):
     """Options of the test.
 
@@ -66,7 +81,7 @@ def strip(pad: str, **how: Unpack[More]) -> dict[str, Any]:
 def test_a_new_option_of_a_record_is_an_option_of_the_command() -> None:
     seen = []
 
-    @derived(strip, More, pad=str)
+    @derived(strip)
     def command(pad: str, **how: Any) -> None:
         """More words."""
         seen.append(strip(pad, **how))

@@ -328,7 +328,7 @@ def test_a_coupon_and_a_grid_are_recognised(page: TestClient, tmp_path: Path) ->
     photo = coupon_photo(coupon, {patch.name: (0.1, 0.12) for patch in coupon.patches}, scale_px_mm=11.8)
     (tmp_path / "coupon.json").write_text(coupon_to_json(coupon), encoding="utf-8")
     (tmp_path / "seen.png").write_bytes(to_png(photo))
-    expected = cmpdesign.kerf(tmp_path / "coupon.json", tmp_path / "seen.png").to_json(coupon)
+    expected = cmpdesign.kerf(tmp_path / "coupon.json", tmp_path / "seen.png").found.to_json(coupon)
     assert dropped(page, photo)["kerf"] == expected
     opened = page.post("/api/layouts", content=coupon_to_json(coupon)).json()
     assert opened["about"].startswith("kerf coupon")

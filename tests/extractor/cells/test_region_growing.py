@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from extractor.cells.cells import EFFORTS, Cells, find_cells
 from extractor.cells.region_growing import MAX_GROWN_AREA, grow
 from extractor.image.pyramid import PyramidLevel
+from extractor.pipeline import ImageReader
 from tests.support.layouts import small_layout
 from tests.support.pictures import extractor, picture
 
@@ -24,7 +25,9 @@ THRESHOLD = 0.15  # as in the article, below eq. 3
 
 
 def view_of(image: Image) -> PyramidLevel:
-    return extractor().pyramid(image, image.dtype).level(1)
+    pyramid = ImageReader(extractor().layout).pyramid(image)
+    assert pyramid is not None
+    return pyramid.level(1)
 
 
 def cells_at(xy: list[tuple[float, float]], area_px: float) -> Cells:

@@ -16,6 +16,7 @@ from extractor.cells.cells import Cells
 from extractor.cells.region_growing import Regions
 from extractor.cells.triangle_fit import fit_edges, regions_as_cells
 from extractor.image.pyramid import PyramidLevel
+from extractor.pipeline import ImageReader
 from tests.support.pictures import extractor, srgb_light, srgb_values
 
 Points = NDArray[np.float64]
@@ -66,7 +67,9 @@ def measured(view: PyramidLevel, corners: Points) -> Points:
 
 
 def view_of(image: NDArray[np.uint8]) -> PyramidLevel:
-    return extractor().pyramid(image, image.dtype).level(1)
+    pyramid = ImageReader(extractor().layout).pyramid(image)
+    assert pyramid is not None
+    return pyramid.level(1)
 
 
 def picture_of(cover: Points, blur_px: float) -> PyramidLevel:

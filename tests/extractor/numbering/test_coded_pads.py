@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.suites.views.views import DAMAGED, View, read_view
 from cmpdesign.design.design import Design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
@@ -75,3 +76,21 @@ def test_another_code_is_not_numbered(made: int, read: int) -> None:
 def test_a_plain_layout_does_not_number_a_coded_pad() -> None:
     for turn_deg in (20.0, 140.0):
         assert not reader(PLAIN).extract(crop(CODE, turn_deg).image).found
+
+
+@pytest.mark.parametrize("number", [34, 142])
+def test_bits_of_several_parts_prove_a_motion_together(number: int) -> None:
+    """Covers cut these crops in parts of less than 50 cells, and no part has bits enough."""
+    result = read_view(View(DAMAGED, 7302, number, CODE, (40.0, 72.0)))
+    assert 60 <= result.black_cells < 70 and result.reported > 100 and result.wrong_ids == 0
+
+
+def test_small_cells_beside_white_ones_are_found_in_one_look() -> None:
+    """At 7 px a side, at the scale of recognition."""
+    layout = build_layout(Design(pattern="honeycomb", layers=16, pitch_mm=1.5, code=CODE))
+    shot = render(
+        Scene(layout, Camera(14.0, 7.3), optics=Optics(0.7), sensor=Sensor(noise=2.0)), size=(640, 480)
+    )
+    markers = Extractor(parse_layout(layout_to_json(layout))).extract(shot.image)
+    assert markers.origin is Origin.CODE and markers.counts["measured"] == len(layout.marker_layer)
+    assert "grow" not in markers.timings_ms  # a second look grows regions

@@ -12,7 +12,8 @@ import pytest
 
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Light, render, standard_layout, standard_scene
-from extractor import Extractor, parse_layout
+from extractor import parse_layout
+from extractor.pipeline import ImageReader
 from extractor.track.image_check import check_cells, light_levels
 from extractor.track.warm_tables import build_warm_tables
 
@@ -21,15 +22,17 @@ from extractor.track.warm_tables import build_warm_tables
 def test_levels_follow_the_light(gain: float) -> None:
     layout = standard_layout("honeycomb", 6)
     reference = parse_layout(layout_to_json(layout))
-    extractor, tables = Extractor(reference), build_warm_tables(reference)
+    reader, tables = ImageReader(reference), build_warm_tables(reference)
     looks, levels = [], []
     for factor in (1.0, gain):
         scene = replace(standard_scene(layout), light=Light(rgb=(factor, factor, factor)))
         image = np.asarray(render(scene).image, np.uint8)
-        read = extractor.read(image)
+        read = reader.read(image)
         looks.append(read.appearance)
         found = check_cells(image, read.markers.xy_px[tables.corners], tables, None)
-        levels.append(light_levels(found.cell_levels, extractor.pyramid(image, image.dtype).response))
+        pyramid = reader.pyramid(image)
+        assert pyramid is not None
+        levels.append(light_levels(found.cell_levels, pyramid.response))
     before, now = looks
     assert before is not None and now is not None
     relit = before.with_lighting(*levels)

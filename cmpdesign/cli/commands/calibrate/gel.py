@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
-import typer
+from cmpdesign.api.force import calibrate_gel
+from cmpdesign.cli.derived import derived
+from cmpdesign.cli.terminal import printable_path, say
 
-from cmpdesign.cli.options.paths import require_suffix
-from cmpdesign.cli.progress import working
-from cmpdesign.cli.terminal import finish, printable_path, say
+if TYPE_CHECKING:
+    from cmpdesign.documents.reading import CalibrateGelDocument
 
 EXAMPLES = (
     "cmpdesign calibrate gel layout.json sensor.toml -o gel.npz",
@@ -17,40 +17,8 @@ EXAMPLES = (
 )
 
 
-def gel(
-    layout: Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pad's layout.json.")],
-    rig: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RIG", help="TOML file with [elastomer]: thickness_mm, poisson, marker_depth_mm."
-        ),
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="File to write: .npz.")],
-    margin_mm: Annotated[
-        float, typer.Option(metavar="MM", help="Width of the gel beyond the layout's outline.")
-    ] = 0.0,
-) -> None:
-    """Compute a pad's elastic response once, so that forces can be read from its displacement.
-
-    The file depends on thickness, Poisson's ratio and marker depth, not on Young's modulus.
-    """
-    from cmpdesign.api.force import calibrate_gel
-    from cmpdesign.documents.reading import CalibrateGelDocument
-
-    require_suffix("--output", output, [".npz"])
-    with working("solving the block"):
-        made = calibrate_gel(layout, rig, output, margin_mm=margin_mm)
-    say(f"{len(made.loads_mm)} loads, {len(made.matrix) // 3} markers, gel of {made.thickness_mm:g} mm")
-    say(f"wrote {printable_path(output)}")
-    finish(
-        lambda: CalibrateGelDocument(
-            written=printable_path(output),
-            digest=made.digest,
-            markers=len(made.matrix) // 3,
-            loads=len(made.loads_mm),
-            thickness_mm=made.thickness_mm,
-            poisson=made.poisson,
-            marker_depth_mm=made.marker_depth_mm,
-            margin_mm=made.margin_mm,
-        )
-    )
+@derived(calibrate_gel, "solving the block")
+def gel(made: CalibrateGelDocument) -> None:
+    """The file depends on thickness, Poisson's ratio and marker depth, not on Young's modulus."""
+    say(f"{made.loads} loads, {made.markers} markers, gel of {made.thickness_mm:g} mm")
+    say(f"wrote {printable_path(made.written)}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
+from cmpdesign.cli.options.completions import complete_template
 from cmpdesign.cli.terminal import finish, print_document, say
 
 if TYPE_CHECKING:
@@ -23,13 +24,6 @@ TAKERS = {
     "silicones": "for --set mold.base_silicone=NAME, marker_silicone, cover_silicone",
     "sensors": "for evaluate --sensor",
 }
-
-
-def complete_template(incomplete: str) -> list[str]:
-    """The names of templates that begin with a text, for the completion of shells."""
-    from cmpdesign.design.templates import template_kinds
-
-    return [name for names in template_kinds().values() for name in names if name.startswith(incomplete)]
 
 
 def templates(

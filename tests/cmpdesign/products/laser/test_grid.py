@@ -143,7 +143,7 @@ def test_the_command_prints_lines_for_the_material_file(tmp_path: Path) -> None:
     result = run("kerf", tmp_path / "grid.json", tmp_path / "grid.png")
     assert result.exit_code == 0, result.stderr
     lines = "\n".join(line for line in result.stdout.splitlines() if line.startswith("cut_"))
-    best = laser_grid(tmp_path / "grid.json", tmp_path / "grid.png").best
+    best = laser_grid(tmp_path / "grid.json", tmp_path / "grid.png").found.best
     assert best is not None and best.passes is not None
     settings = tomllib.loads(lines)
     assert settings["cut_power_percent"]["value"] == best.power_percent
