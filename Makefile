@@ -68,7 +68,7 @@ lint: $(READY) $(CORE)
 bench: $(READY) $(CORE)
 	@set -e; for name in extraction accuracy comparison datasets photoreal; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name --publish; done
 	@$(BIN)/python -m tools.figures
-	@set -e; for name in startup interrupts numbering tracking rendering contact large_strain reconstruction medium laser kerf molds stress damage calibration camera codecs live sweeps views; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
+	@set -e; for name in startup interrupts numbering tracking rendering contact large_strain reconstruction medium laser kerf molds stress damage calibration camera codecs live sweeps views lenses rig; do echo "== benchmarks.$$name"; $(BIN)/python -m benchmarks.$$name; done
 
 figures: $(READY) $(CORE)
 	@$(BIN)/python -m tools.figures

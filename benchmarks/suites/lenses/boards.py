@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import cv2
@@ -23,7 +23,7 @@ from extractor import View
 
 Array = NDArray[np.float64]
 INNER = 2 * BOARD_LAYERS  # corners in a row
-SB_FLAGS = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
+WINDOWS_PX = (5, 8)  # half sides for cv2.cornerSubPix
 RATIONAL = cv2.CALIB_RATIONAL_MODEL
 # Number of coefficients -> flags of cv2.calibrateCamera.
 PERSPECTIVE = {5: 0, 8: RATIONAL, 12: RATIONAL | cv2.CALIB_THIN_PRISM_MODEL}
@@ -41,8 +41,8 @@ def by_opencv(count: int, sheet: Sheet, sightings: Sequence[Sighting]) -> View:
 
 def by_opencv_fisheye(sheet: Sheet, sightings: Sequence[Sighting]) -> View:
     """The camera of cv2.fisheye.calibrate."""
-    places = [sheet.flat_mm[one.ids][:, None] for one in sightings]
-    pixels = [one.xy_px[:, None] for one in sightings]
+    places = [sheet.flat_mm[one.ids][None] for one in sightings]
+    pixels = [one.xy_px[None] for one in sightings]
     flags = cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW
     _, k, lens, _, _ = cv2.fisheye.calibrate(places, pixels, SIZE_PX, np.eye(3), np.zeros(4), flags=flags)
     return View("opencv", (k[0, 0], k[1, 1]), (k[0, 2], k[1, 2]), tuple(lens.ravel()), lens="fisheye")
@@ -71,39 +71,46 @@ def board_error_px(
     true: View,
     seed: Any,
 ) -> float:
-    """The RMS ray error over pixels by OpenCV's best model, from pictures of a chessboard; NaN where no model fits.
+    """The RMS ray error over pixels by OpenCV, from pictures of a chessboard; NaN where no model fits.
 
-    The best model is chosen by the truth, and no picture contradicts: both favour OpenCV.
+    Model and window of ``cv2.cornerSubPix`` are the best ones by the truth, and no picture contradicts: all favours
+    OpenCV.
     """
     layout, taken = board_layout(area_mm2), replace(conditions, bad=())
     white = Plain(INKS["white"])
     pictures = take_pictures(camera, layout, count, taken, np.random.default_rng(seed), white)
-    sheet, sightings = _corners(layout, pictures)
-    errors = []
-    for solve in (*(_solver(n) for n in PERSPECTIVE), by_opencv_fisheye):
-        try:
-            found = solve(sheet, sightings)
-        except cv2.error:  # no such lens fits
-            continue
-        error = ray_differences(true, found, pixels)
-        if np.isfinite(error).all():
-            errors.append(float(np.sqrt(np.mean(error**2))))
+    sheet, errors = _board_sheet(layout), []
+    for sightings in _corners(pictures):
+        for solve in (*(partial(by_opencv, n) for n in PERSPECTIVE), by_opencv_fisheye):
+            try:
+                error = ray_differences(true, solve(sheet, sightings), pixels)
+            except cv2.error:  # no such lens fits
+                continue
+            if np.isfinite(error).all():
+                errors.append(float(np.sqrt(np.mean(error**2))))
     return min(errors, default=float("nan"))
 
 
-def _solver(count: int) -> Any:
-    return lambda sheet, sightings: by_opencv(count, sheet, sightings)
-
-
-def _corners(layout: Layout, pictures: Sequence[NDArray[Any]]) -> tuple[Sheet, list[Sighting]]:
+def _board_sheet(layout: Layout) -> Sheet:
     low, high = layout.marker_xy_mm.min(axis=0), layout.marker_xy_mm.max(axis=0)
     places = np.linspace(low, high, INNER + 2)[1:-1]
-    sheet = Sheet(np.stack(np.meshgrid(places[:, 0], places[:, 1]), axis=-1).reshape(-1, 2))
-    found = []
+    return Sheet(np.stack(np.meshgrid(places[:, 0], places[:, 1]), axis=-1).reshape(-1, 2))
+
+
+def _corners(pictures: Sequence[NDArray[Any]]) -> list[list[Sighting]]:
+    """The corners of the pictures that show the whole board: of the detector, and refined with each window."""
+    found: list[list[Sighting]] = [[] for _ in range(1 + len(WINDOWS_PX))]
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-4)
     for number, picture in enumerate(pictures):
         grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-        seen, corners = cv2.findChessboardCornersSB(grey, (INNER, INNER), None, SB_FLAGS)
-        if seen:
-            xy_px = corners.reshape(-1, 2).astype(np.float64)
-            found.append(Sighting(str(number), np.arange(len(xy_px)), xy_px))
-    return sheet, found
+        seen, corners = cv2.findChessboardCornersSB(grey, (INNER, INNER), None, cv2.CALIB_CB_EXHAUSTIVE)
+        if not seen:
+            continue
+        ways = [corners]
+        for window in WINDOWS_PX:
+            refined = corners.astype(np.float32).copy()
+            ways.append(cv2.cornerSubPix(grey, refined, (window, window), (-1, -1), stop))
+        for way, sightings in zip(ways, found, strict=True):
+            xy_px = way.reshape(-1, 2).astype(np.float64)
+            sightings.append(Sighting(str(number), np.arange(len(xy_px)), xy_px))
+    return found

@@ -88,6 +88,40 @@ def test_pictures_that_contradict_are_named_with_their_cause() -> None:
     assert found.camera.focal_px[0] == pytest.approx(view.focal_px[0], abs=0.2)
 
 
+def test_deviations_follow_from_how_pictures_agree() -> None:
+    view, sheet, rng = camera(), lattice(), np.random.default_rng(9)
+    exact, sigma_px, share = see(view, sheet, 10, rng, sigma_px=1e-6), 0.02, 0.7
+    apart = np.linalg.norm(sheet.xy_mm[:, None] - sheet.xy_mm, axis=2)
+    neighbours = (apart > 0) & (apart < 2.1)
+    mixed = np.eye(len(apart)) - share * neighbours / neighbours.sum(axis=1)[:, None]
+    mixed /= np.linalg.norm(mixed, axis=1)[:, None]
+    found = []
+    for mixing in (np.eye(len(mixed)), mixed):
+        sightings = [
+            one._replace(
+                xy_px=one.xy_px + sigma_px * mixing @ rng.normal(size=one.xy_px.shape),
+                cov_px2=np.tile(sigma_px**2 * np.eye(2), (len(mixed), 1, 1)),
+            )
+            for one in exact
+        ]
+        found.append(calibrate_points(sheet, sightings, SIZE_PX, MODELS[1:2]))
+    independent, cancelling = found
+    assert independent.adjusted.base == pytest.approx(cancelling.adjusted.base, rel=0.1)
+    # errors that neighbours share cancel to 1 - share, shorter ones less
+    assert (1 - share) / 1.04 < cancelling.ray_px / independent.ray_px < 0.55
+    true = np.array([*view.focal_px, *view.centre_px, *view.distortion])
+    error = (
+        np.array([*cancelling.camera.focal_px, *cancelling.camera.centre_px, *cancelling.camera.distortion])
+        - true
+    )
+    assert 0.5 < np.sqrt(error @ np.linalg.solve(cancelling.cov, error) / len(error)) < 1.6
+    # a contradiction that is hidden in the scatter of the points, but not in the answer about the lens
+    sightings[4] = zoomed(sightings[4], 0.002)
+    doubtful = calibrate_points(sheet, sightings, SIZE_PX, MODELS[1:2])
+    assert [one.name for one in doubtful.pictures if not one.used] == ["p4.png"]
+    assert max(one.scale for one in doubtful.pictures) < 2
+
+
 def test_real_corners_are_explained_better_than_by_opencv() -> None:
     sheet, sightings = chessboards()
     found = calibrate_points(sheet, sightings, SIZE_PX)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -64,21 +63,23 @@ def serve(
                 finish(lambda: ServeDocument(address=server.address))
             else:
                 print_document(f"{server.address}\n")
-            with suppress(KeyboardInterrupt):
-                _tell_events(opened)
+            _tell_events(opened)
         finally:
             server.close()
 
 
-def _tell_events(sensors: Sensors) -> NoReturn:
-    """Print the events of the cameras until Ctrl-C."""
+def _tell_events(sensors: Sensors) -> None:
+    """Print the events of the cameras until Ctrl-C or SIGTERM, after which recordings are completed."""
     import time
 
-    told = dict.fromkeys((one.name for one in sensors), 0)
-    while True:
-        time.sleep(_LOOK_S)
-        for sensor in sensors:
-            events = sensor.events_since(told[sensor.name])
-            told[sensor.name] += len(events)
-            for event in events:
-                say(f"{sensor.name}: {event}")
+    from cmpdesign.tracking.run import StopRequest, stop_on_signal
+
+    told, stop = dict.fromkeys((one.name for one in sensors), 0), StopRequest()
+    with stop_on_signal(stop):
+        while not stop.is_requested:
+            time.sleep(_LOOK_S)
+            for sensor in sensors:
+                events = sensor.events_since(told[sensor.name])
+                told[sensor.name] += len(events)
+                for event in events:
+                    say(f"{sensor.name}: {event}")
