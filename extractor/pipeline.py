@@ -288,10 +288,10 @@ class ImageReader:
         layout, topology = pad.layout, pad.topology
         refined = stages.record("refine", pad.refiner(pyramid, places, before))
         repaired = repair_markers(refined, places, pad.lattice, size)
-        rows = find_row_break(topology, repaired, size)
+        rows = find_row_break(topology, refined, repaired, size)
         repaired = beside_row_break(rows, repaired)
         xy, cov, points = without_parallax(
-            refined.appearance.parallax, repaired.xy_px, repaired.cov_px2, refined.points
+            refined.appearance.parallax, topology.edges, repaired.xy_px, repaired.cov_px2, refined.points
         )
         repaired = stages.record("repair", RepairedMarkers(xy, cov, repaired.status))
         virtual = partial(locate_virtual_markers, topology, repaired, points, refined.scatter)

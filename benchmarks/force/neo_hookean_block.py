@@ -19,8 +19,10 @@ from benchmarks.force.block_mesh import extrude, triangulate_outline
 from benchmarks.force.objects import RigidObject
 
 Array = NDArray[np.float64]
-PENALTY_PER_MODULUS, STICK_PER_MODULUS = 150.0, 30.0  # of the modulus E, 1/mm
-TOLERANCE_MM, LARGEST_STEP_MM, MOST_STEPS = 1e-4, 0.2, 25
+PENALTY_PER_MODULUS, STICK_PER_MODULUS = 40.0, 10.0  # of the modulus E, 1/mm
+RAMP_MM = 0.004  # of penetration, over which the penalty grows to its full stiffness
+TOLERANCE_MM, LARGEST_STEP_MM, MOST_STEPS = 1e-3, 0.2, 25
+LEAST_LIMIT = 1e-5  # of the modulus, where nothing has pressed before
 
 try:  # a tenth of the time of SciPy's solver
     import pypardiso
@@ -100,11 +102,11 @@ class NeoHookeanBlock:
         self.last: _Contact | None = None
         self.last = self._contact(self.u, self.pose)
 
-    def move(self, pose: Pose, largest_mm: float = 0.2) -> Wrench:
+    def move(self, pose: Pose, largest_mm: float = 0.12) -> Wrench:
         """Follow the object in a straight line to a pose."""
         start = np.array(self.pose)
         way = np.array(pose) - start
-        steps = max(1, int(np.ceil(max(np.abs(way[:3]).max() / largest_mm, abs(way[3]) / 4.0))))
+        steps = max(1, int(np.ceil(max(np.abs(way[:3]).max() / largest_mm, abs(way[3]) / 3.0))))
         done, size = 0.0, 1.0 / steps
         while done < 1 - 1e-9:
             size = min(size, 1 - done)
@@ -147,7 +149,7 @@ class NeoHookeanBlock:
         u, p = self.u.copy(), self.p.copy()
         before = np.inf
         for iteration in range(MOST_STEPS):
-            contact = self._contact(u, pose)
+            contact = self._contact(u, pose) if iteration else self._expected(pose)
             du, dp = self._newton(u, p, contact)
             largest = np.abs(du).max()
             if not np.isfinite(largest) or largest > 50:
@@ -163,6 +165,16 @@ class NeoHookeanBlock:
                 self.stick, self.face_u = self.last.tangent, self._on_face(u)
                 return True
         return False
+
+    def _expected(self, pose: Pose) -> _Contact:
+        """The contact after the object's motion to a pose, linearised where the block is: the same places touch."""
+        last = self.last
+        if not last.pressure.any():
+            return self._contact(self.u, pose)
+        x = self._face_points() + self.face_u
+        (now, _), (before, turn) = self._object_frame(x, pose), self._object_frame(x, self.pose)
+        carried = (before - now) @ turn.T
+        return last._replace(traction=last.traction - np.einsum("nij,nj->ni", last.stiffness, carried))
 
     def _on_face(self, u: Array) -> Array:
         return np.asarray(np.einsum("aft,afi->fti", self.face_values, u[self.face_nodes]).reshape(-1, 3))
@@ -181,7 +193,8 @@ class NeoHookeanBlock:
         gap, normal = self.target.gap(local)
         touching = gap < 0
         penalty, grip = PENALTY_PER_MODULUS * self.young, STICK_PER_MODULUS * self.young
-        pressure = np.where(touching, -penalty * gap, 0.0)
+        deep = np.where(touching, -gap, 0.0)
+        pressure = penalty * np.where(deep < RAMP_MM, deep**2 / (2 * RAMP_MM), deep - RAMP_MM / 2)
         normal = normal @ turn.T
         curved = np.zeros((len(x), 3, 3))
         curved[touching] = np.einsum("ij,njk,lk->nil", turn, self.target.turn(local[touching]), turn)
@@ -195,24 +208,25 @@ class NeoHookeanBlock:
         held = grip * (self.last.pressure > 0)[:, None] if self.last is not None else 0.0 * touching[:, None]
         pull = self.stick - held * slip
         trial = np.einsum("nij,nj->ni", flat, pull)
-        size = np.linalg.norm(trial, axis=1)
-        limit = self.friction * pressure
-        slipping = (size > limit) & touching
-        unit = trial / np.maximum(size, 1e-15)[:, None]
-        tangent = np.where(touching[:, None], np.where(slipping[:, None], limit[:, None] * unit, trial), 0.0)
-        d_pressure = -penalty * touching[:, None] * normal
+        # The limit is that of the pressure before this increment, and the way from sticking to slipping is smooth:
+        # both keep Newton's method convergent, and the tractions are in equilibrium with the block all the same.
+        limit = (
+            self.friction * (self.last.pressure if self.last is not None else pressure)
+            + LEAST_LIMIT * self.young
+        )
+        root = np.sqrt(limit**2 + (trial**2).sum(axis=1))
+        ratio = np.where(touching, limit / root, 0.0)
+        tangent = ratio[:, None] * trial
+        d_pressure = -penalty * np.minimum(deep / RAMP_MM, 1.0)[:, None] * normal
         stiff = normal[:, :, None] * d_pressure[:, None, :] + pressure[:, None, None] * curved
         along = (normal * pull).sum(axis=1)
         turned = np.einsum("nji,nj->ni", curved, pull)
         d_trial = (
             -held[:, :, None] * flat - along[:, None, None] * curved - normal[:, :, None] * turned[:, None, :]
         )
-        stick = d_trial * (touching & ~slipping)[:, None, None]
-        across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
-        ratio = np.where(slipping, limit / np.maximum(size, 1e-15), 0.0)
-        slide = self.friction * slipping[:, None, None] * unit[:, :, None] * d_pressure[:, None, :]
-        slide = slide + ratio[:, None, None] * (across @ d_trial)
-        return _Contact(pressure[:, None] * normal + tangent, tangent, stiff + stick + slide, pressure)
+        unit = trial / root[:, None]
+        slide = ratio[:, None, None] * ((np.eye(3) - unit[:, :, None] * unit[:, None, :]) @ d_trial)
+        return _Contact(pressure[:, None] * normal + tangent, tangent, stiff + slide, pressure)
 
     def _newton(self, u: Array, p: Array, contact: _Contact) -> tuple[Array, Array]:
         w, slopes, shapes = self.weights, self.slopes, self.shapes

@@ -21,8 +21,8 @@ class Seen:
     reader: ContactReader
     view: View | None
 
-    def read(self, displacement_mm: Array, random: np.random.Generator) -> ContactForce:
-        """The contact from displacements (M, 3) mm without noise."""
+    def read(self, displacement_mm: Array, random: np.random.Generator, lost: float = 0.0) -> ContactForce:
+        """The contact from displacements (M, 3) mm without noise, of which a share is lost."""
         flat_mm = np.pad(self.reader.layout.xy_mm, [(0, 0), (0, 1)])
         sigma, moved = SIGMA_MM, displacement_mm
         if self.view is not None:
@@ -31,7 +31,9 @@ class Seen:
                 self.view.project(flat_mm + moved) - self.view.project(flat_mm),
             )
         cov = np.tile(np.diag(sigma**2), (len(flat_mm), 1, 1))
-        return self.reader.read(moved + sigma * random.normal(size=moved.shape), cov)
+        moved = moved + sigma * random.normal(size=moved.shape)
+        moved[random.permutation(len(moved))[: round(lost * len(moved))]] = np.nan
+        return self.reader.read(moved, cov)
 
 
 def seen_from(reader: ContactReader, far_mm: float | None) -> Seen:

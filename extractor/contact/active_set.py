@@ -25,7 +25,8 @@ class Limits:
     """Thresholds of the active set.
 
     Attributes:
-        tau: standard deviation of the peak tractions before the measurement, in Young's moduli. Chosen; not sensitive.
+        tau: standard deviation of the peak tractions before the measurement, in Young's moduli. Measured:
+            python -m benchmarks.force, half or twice as much makes the force of a thin layer scatter more.
         gain_beside, gain_elsewhere: gain in units of chi above which a load beside the support, or elsewhere, is added.
             Chosen.
         rounds: additions to the support at most. Chosen.
@@ -33,7 +34,7 @@ class Limits:
         seed_share: share of the largest pressure above which a load of the cold start belongs to the support. Chosen.
     """
 
-    tau: float = 0.5
+    tau: float = 0.25
     gain_beside: float = 3.0
     gain_elsewhere: float = 12.0
     rounds: int = 12
@@ -108,6 +109,7 @@ class TractionSolver:
         if largest < self._limits.gain_elsewhere:
             return None
         support = self._cold_start(measured) if start is None or not len(start) else start
+        tried = np.zeros(len(gain), np.bool_)
         for _ in range(self._limits.rounds):
             support, traction, inverse, residual = self._settle(white, whitening, support)
             chi = max(1.0, float(np.sqrt((residual**2).sum() / known)))
@@ -116,7 +118,9 @@ class TractionSolver:
             beside = np.zeros(len(gain) + 1, np.bool_)
             beside[self._neighbours[support].ravel()] = True
             limit = np.where(beside[:-1], self._limits.gain_beside, self._limits.gain_elsewhere)
-            wanted = gain > chi * limit
+            # a load joins once: one that left again would join and leave for ever
+            wanted = (gain > chi * limit) & ~tried
+            tried |= wanted
             stray = self._strays(support, traction, inverse, chi)
             if not wanted.any() and not stray.any():
                 break
@@ -132,6 +136,8 @@ class TractionSolver:
         """
         parts = _connected(support, self._neighbours)
         stray = np.zeros(len(support), np.bool_)
+        if parts.max(initial=0) == 0:
+            return stray
         gains = []
         for part in range(int(parts.max(initial=-1)) + 1):
             rows = 3 * np.flatnonzero(parts == part) + 2

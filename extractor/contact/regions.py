@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from extractor.contact.gel import Gel
 
 Array = NDArray[np.float64]
+AROUND = 3  # cells of that picture's rim around the loads of the support; chosen
 FINE = 4  # cells of the picture of the pressure per spacing of the loads; chosen
 HERTZ = (
     2.5  # square of a contact's radius over the mean square distance of its pressure from the centre. Derived
@@ -62,15 +63,17 @@ def touched_area(at_mm: Array, press_n: Array, spacing_mm: float) -> float:
 def find_patches(gel: Gel, pressure_mpa: Array, support: NDArray[np.intp], press_n: Array) -> list[Patch]:
     """The regions of the pressure (K,) at the loads; every load of the support, of force (S,), belongs to one."""
     step = gel.spacing_mm
-    low = gel.loads_mm.min(axis=0)
-    cell = np.round((gel.loads_mm - low) / step).astype(np.intp) + 1
-    field = np.zeros(cell.max(axis=0)[::-1] + 2)
-    field[cell[:, 1], cell[:, 0]] = pressure_mpa
+    cell = np.round(gel.loads_mm / step).astype(np.intp)
+    first = cell[support].min(axis=0) - AROUND
+    size = cell[support].max(axis=0) + AROUND + 1 - first
+    near = ((cell >= first) & (cell < first + size)).all(axis=1)
+    field = np.zeros(size[::-1])
+    field[tuple((cell[near] - first).T[::-1])] = pressure_mpa[near]
     labels = _labels(field)
-    at = labels[cell[support, 1], cell[support, 0]]
+    at = labels[tuple((cell[support] - first).T[::-1])]
     found = []
     fine = cv2.resize(field, None, fx=FINE, fy=FINE, interpolation=cv2.INTER_CUBIC)
-    wide = cv2.resize(labels.astype(np.float64), None, fx=FINE, fy=FINE, interpolation=cv2.INTER_NEAREST)
+    wide = np.repeat(np.repeat(labels, FINE, axis=0), FINE, axis=1)
     for label in np.unique(at):
         members = np.flatnonzero(at == label)
         area = touched_area(gel.loads_mm[support[members]], press_n[members], step)
@@ -79,7 +82,7 @@ def find_patches(gel: Gel, pressure_mpa: Array, support: NDArray[np.intp], press
         touched = (own >= np.partition(own.ravel(), -count)[-count]).astype(np.uint8)
         outlines, _ = cv2.findContours(touched, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         outline = max(outlines, key=cv2.contourArea)[:, 0].astype(np.float64)
-        outline = ((outline + 0.5) / FINE - 0.5 - 1.0) * step + low
+        outline = ((outline + 0.5) / FINE - 0.5 + first) * step
         found.append(Patch(members, area, _counter_clockwise(outline)))
     return found
 
@@ -94,31 +97,23 @@ def _labels(field: Array) -> NDArray[np.intp]:
     step = around.argmax(axis=0)
     step[field >= around.max(axis=0)] = 4
     rows, columns = np.indices(field.shape)
-    goal = (rows + step // 3 - 1) * nx + columns + step % 3 - 1
-    goal = goal.ravel()
+    goal = ((rows + step // 3 - 1) * nx + columns + step % 3 - 1).ravel()
     for _ in range(int(np.ceil(np.log2(ny + nx))) + 1):
         goal = goal[goal]
-    value = field.ravel()
-    parent = np.arange(len(value))
-
-    def root(k: int) -> int:
-        while parent[k] != k:
-            k = int(parent[k])
-        return k
-
+    value, grid = field.ravel(), goal.reshape(ny, nx)
+    joined = []
     for a, b in (
         (np.s_[:, :-1], np.s_[:, 1:]),
         (np.s_[:-1], np.s_[1:]),
         (np.s_[:-1, :-1], np.s_[1:, 1:]),
         (np.s_[1:, :-1], np.s_[:-1, 1:]),
     ):
-        grid = goal.reshape(ny, nx)
-        one, two, saddle = grid[a].ravel(), grid[b].ravel(), np.minimum(field[a], field[b]).ravel()
-        apart = one != two
-        for left, right, height in zip(one[apart], two[apart], saddle[apart], strict=True):
-            if height > SADDLE_SHARE * min(value[left], value[right]) and height > 0:
-                parent[root(int(left))] = root(int(right))
-    return np.array([root(int(k)) for k in goal], np.intp).reshape(ny, nx)
+        one, two, saddle = grid[a], grid[b], np.minimum(field[a], field[b])
+        high = (one != two) & (saddle > np.maximum(SADDLE_SHARE * np.minimum(value[one], value[two]), 0))
+        joined.append(np.column_stack([one[high], two[high]]))
+    for one, two in np.unique(np.concatenate(joined), axis=0):
+        goal[goal == goal[one]] = goal[two]
+    return np.asarray(goal.reshape(ny, nx))
 
 
 def _counter_clockwise(outline: Array) -> Array:

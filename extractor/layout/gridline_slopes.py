@@ -58,8 +58,12 @@ def slope_weights(
     ring_markers: NDArray[np.int32],
     edges: NDArray[np.int64],
     edge_vectors: NDArray[np.float64],
+    is_curved: NDArray[np.bool_],
 ) -> SlopeWeights:
-    """The weights; the arguments are ``derivative_stencil`` and others of ``Topology``."""
+    """The weights; the arguments are ``derivative_stencil`` and others of ``Topology``.
+
+    Second derivatives count as 0 at markers that are not ``is_curved`` (M,).
+    """
     x, y = edge_vectors.T
     ids, first, second, chord = [], [], [], []
     for at in (0, 1):
@@ -70,7 +74,7 @@ def slope_weights(
         weights = stencil[marker]
         first.append(_with_own(x[:, None] * weights[:, 0] + y[:, None] * weights[:, 1]))
         curved = np.stack([x * x, 2 * x * y, y * y], axis=1)
-        second.append(_with_own(np.einsum("ed,edk->ek", curved, weights[:, 2:])))
+        second.append(_with_own(np.einsum("ed,edk->ek", curved, weights[:, 2:]) * is_curved[marker, None]))
         chord.append(np.zeros_like(first[at]))
         chord[at][:, -1] = CHORD[at]
     nothing, both_chords = np.zeros_like(first[0]), np.concatenate(chord, axis=1)

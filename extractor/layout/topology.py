@@ -100,7 +100,12 @@ def topology_of(layout: Reference) -> Topology:
     )
     stencil = _derivative_stencil(ring_markers, ring_vectors)
     edge_vectors = chord / length.mean()
-    slopes = slope_weights(stencil, ring_markers, edges, edge_vectors)
+    # from one side, scatter makes more second derivatives than bending does: the rim's count as 0, and what is left
+    # out may be as large as what scatter would make
+    slopes, all_slopes = (
+        slope_weights(stencil, ring_markers, edges, edge_vectors, is_curved)
+        for is_curved in (np.all(spokes >= 0, axis=1), np.ones(len(spokes), np.bool_))
+    )
     couplings = end_couplings(slopes, edges)
     is_inner: NDArray[np.bool_] = np.all(ring_markers >= 0, axis=1)
     is_seen: NDArray[np.bool_] = np.any(edge_cells >= 0, axis=1)
@@ -122,7 +127,7 @@ def topology_of(layout: Reference) -> Topology:
         next_edges=_next_edges(spokes, edges, next_markers, key),
         end_couplings=couplings,
         covariance_couplings=covariance_couplings(couplings, slopes, gridlines),
-        scatter_bending=scatter_bending(slopes, edges, edge_vectors, spokes),
+        scatter_bending=scatter_bending(all_slopes, edges, edge_vectors, spokes),
         cell_height=0.0 if layout.as_made is None else layout.as_made.cell_height_mm / float(length.mean()),
     )
 

@@ -131,18 +131,21 @@ def unknown_parallax(outward: float, across: float, size_px: Points) -> Parallax
 
 
 def without_parallax(
-    parallax: Parallax | None, xy_px: Points, cov_px2: Points, points_px: Points
+    parallax: Parallax | None, edges: NDArray[np.int32], xy_px: Points, cov_px2: Points, points_px: Points
 ) -> tuple[Points, Points, Points]:
-    """Markers (M, 2), covariances (M, 2, 2) and points (E, m, 3) in the plane of the black.
+    """Markers (M, 2), covariances (M, 2, 2) and points (E, m, 3) of gridlines (E, 2) in the plane of the black.
 
-    The variance of a point is across its gridline; the whole trace of the shift's covariance is added.
+    The variance of a point is across its gridline.
     """
     if parallax is None:
         return xy_px, cov_px2, points_px
+    chord = xy_px[edges[:, 1]] - xy_px[edges[:, 0]]
+    normal = np.stack([-chord[:, 1], chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1, keepdims=True)
     flat = points_px[..., :2].reshape(-1, 2)
     moved = points_px.copy()
     moved[..., :2] -= parallax.shift_px(flat).reshape(moved[..., :2].shape)
-    moved[..., 2] += np.trace(parallax.cov_px2(flat), axis1=1, axis2=2).reshape(moved.shape[:2])
+    of_shift = parallax.cov_px2(flat).reshape(*moved.shape[:2], 2, 2)
+    moved[..., 2] += np.einsum("ei,ejik,ek->ej", normal, of_shift, normal)
     return xy_px - parallax.shift_px(xy_px), cov_px2 + parallax.cov_px2(xy_px), moved
 
 

@@ -26,7 +26,7 @@ from extractor import Status
 
 PIPELINE = "extractor/pipeline.py"
 NOTHING = Rule("nothing", "", "accuracy", PIPELINE, "import annotations\n", "import annotations \n")
-READING = Rule("reading", "", "accuracy", PIPELINE, "        if bgr is None:\n", "        if True:\n")
+READING = Rule("reading", "", "accuracy", PIPELINE, "        if pyramid is None:\n", "        if True:\n")
 NATIVE_READING = Rule(
     "native reading",
     "",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -31,14 +32,11 @@ double median(Values values) {
 
 double length(double x, double y) { return std::sqrt(x * x + y * y); }
 
-// The gridlines of four markers that are measured with certainty, and the lengths of all measured edges; a
+// The gridlines of four measured markers, and the lengths of all measured edges; a
 // jump is a third of the third difference.
 std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::Topology& topology,
                                    const JumpLimits& limits, std::vector<double>& lengths) {
   const auto is_measured = [&](Index m) { return m >= 0 && markers.status[m] == MEASURED; };
-  const auto is_certain = [&](Index m, double most) {
-    return is_measured(m) && markers.cov_px2(m, 0, 0) + markers.cov_px2(m, 1, 1) < 2.0 * most * most;
-  };
   std::vector<Gridline> found;
   double uu = 0, uv = 0, vv = 0;
   Vector by_u{}, by_v{};
@@ -47,13 +45,10 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
     if (!is_measured(a) || !is_measured(b)) continue;
     Gridline line{e, {}, {}, {}};
     for (int k = 0; k < 2; ++k) line.rise[k] = markers.xy_px(b, k) - markers.xy_px(a, k);
-    const double edge_px = length(line.rise[0], line.rise[1]), most = limits.max_deviation * edge_px;
-    lengths.push_back(edge_px);
+    lengths.push_back(length(line.rise[0], line.rise[1]));
     const Index before = topology.next_markers(e, 0), after = topology.next_markers(e, 1);
     const double own = length(topology.third_differences(e, 0), topology.third_differences(e, 1));
-    if (own >= 3 * limits.most_of_layout) continue;
-    if (!is_certain(before, most) || !is_certain(a, most) || !is_certain(b, most) || !is_certain(after, most))
-      continue;
+    if (own >= 3 * limits.most_of_layout || !is_measured(before) || !is_measured(after)) continue;
     const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
     uu += u * u, uv += u * v, vv += v * v;
     for (int k = 0; k < 2; ++k) {
@@ -76,8 +71,9 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
   return found;
 }
 
-// The length of the median jump of each strip along an axis, the later row or column less the earlier one.
-Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, double edge,
+// The length of the median jump of each strip along an axis, the later row or column less the earlier one,
+// beyond `disagreement` times the squared distance of its gridlines' jumps from that.
+Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, double edge, double disagreement,
                              const JumpLimits& limits) {
   struct Crossing {
     std::size_t strip;
@@ -101,12 +97,21 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
     const std::size_t at = --next[one.strip];
     x[at] = one.jump[0], y[at] = one.jump[1];
   }
-  Array<double, 1> jump({static_cast<Index>(end.size())}, 0.0);
+  Array<double, 1> jump({static_cast<Index>(end.size())}, std::numeric_limits<double>::quiet_NaN());
   for (std::size_t s = 0; s < end.size(); ++s) {
     const std::size_t count = end[s] - next[s];
-    if (static_cast<Index>(count) >= limits.min_gridlines)
-      jump[static_cast<Index>(s)] =
-          length(median(Values(x).subspan(next[s], count)), median(Values(y).subspan(next[s], count)));
+    if (static_cast<Index>(count) < limits.min_gridlines) continue;
+    std::vector<double> apart(count);
+    for (std::size_t i = 0; i < count; ++i) apart[i] = x[next[s] + i];
+    const double dx = median(apart);
+    for (std::size_t i = 0; i < count; ++i) apart[i] = y[next[s] + i];
+    const double dy = median(apart);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double from_x = x[next[s] + i] - dx, from_y = y[next[s] + i] - dy;
+      apart[i] = from_x * from_x + from_y * from_y;
+    }
+    const double beyond = dx * dx + dy * dy - disagreement * median(apart);
+    jump[static_cast<Index>(s)] = std::sqrt(std::max(beyond, 0.0));
   }
   return jump;
 }
@@ -120,7 +125,8 @@ StripJumps measure_jumps(const LocatedMarkers& markers, const layout::Topology& 
   if (static_cast<Index>(lengths.size()) < limits.min_gridlines)
     return {0.0, Array<double, 1>({0}), Array<double, 1>({0})};
   const double edge = median(lengths);
-  return {edge, jumps_along(lines, 1, edge, limits), jumps_along(lines, 0, edge, limits)};
+  return {edge, jumps_along(lines, 1, edge, limits.disagreement, limits),
+          jumps_along(lines, 0, edge, 0.0, limits)};
 }
 
 }  // namespace cmp::complete

@@ -193,9 +193,10 @@ VirtualMarkers locate_on_edges(const LocatedMarkers& markers, const refine::Mark
   if (m == 0) return {std::move(xy), std::move(cov), std::move(status)};
   Array<bool, 1> known({markers.status.size()});
   for (Index k = 0; k < known.size(); ++k) known[k] = markers.status[k] != LOST;
-  const Array<double, 3> maps =
+  Array<double, 3> maps =
       refine::local_maps(markers.xy_px, topology.ring_markers, topology.ring_vectors,
                          topology.derivative_stencil, limits.gridlines);
+  if (scatter.share > 0.0) refine::update_without_rim_curves(maps, topology.spokes);
   const GridlineEnds ends{markers.xy_px, markers.cov_px2, known, maps, scatter};
   MarkerWeights weights(ends, topology);
   for (Index e = 0; e < count; ++e) {

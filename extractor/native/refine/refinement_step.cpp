@@ -81,6 +81,14 @@ MovedPattern move_pattern(const SteppedMarkers& markers, const layout::Topology&
       known, maps, diagonal, {topology.edges, topology.next_markers, topology.third_differences},
       topology.spokes, topology.ring_markers, limits.bending);
   const MarkerScatter scatter = measure_scatter(known, maps, diagonal, topology, limits.scatter);
+  if (scatter.share > 0.0) {
+    update_without_rim_curves(maps, topology.spokes);
+    // the map of markers that scatter puts a marker farther off than a weak measurement does
+    for (Index m = 0; m < xy.size(); ++m) {
+      if (!hidden[m] || !std::isfinite(markers.measured(m, 0))) continue;
+      for (Index axis = 0; axis < 2; ++axis) xy(m, axis) = markers.measured(m, axis);
+    }
+  }
   return {std::move(xy), std::move(hidden), std::move(maps), std::move(roughness), scatter};
 }
 

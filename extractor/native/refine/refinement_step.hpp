@@ -69,10 +69,10 @@ ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::
 
 // The markers as a step left them.
 struct SteppedMarkers {
-  View<const double, 2> reliable;  // (M, 2) px, NaN where unknown
+  View<const double, 2> measured, reliable;  // (M, 2) px; reliable: NaN where the image shows a marker little
   Information information;
 
-  CMP_RECORD("extractor.refine.estimate.Estimate", reliable, information)
+  CMP_RECORD("extractor.refine.estimate.Estimate", measured, reliable, information)
 };
 
 // The same with what bends its gridlines.

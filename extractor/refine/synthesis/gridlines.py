@@ -5,7 +5,7 @@ estimated from the two rings of neighbours, and gives the direction of each grid
 cubic between two markers with these directions, as in a C1-smooth interpolation of the map (Clough-Tocher).
 
 Where markers scatter independently, the directions are wrong, and the sides of cells are straight. There a gridline
-curves by the map's second derivatives (``marker_scatter``).
+curves by the map's second derivatives (``marker_scatter``), inside the pattern; at the rim these count as 0.
 """
 
 from __future__ import annotations

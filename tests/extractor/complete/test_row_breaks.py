@@ -88,11 +88,14 @@ def distances(markers: Markers, taken: Taken) -> NDArray[np.float64]:
     [
         (lambda: torn(7.0, 3.0), "torn"),
         (lambda: torn(-4.0, -7.0), "torn"),
+        (lambda: torn(6.1, -7.0), "torn"),  # all markers beside the tear are uncertain
         (lambda: torn(-15.0, 3.0), "torn"),  # the upper part is not numbered
         (lambda: without_rows(2), "torn"),
         (lambda: without_rows(5), "torn"),
         (lambda: wobbling(3.0, 90.0), "rolling shutter"),
         (lambda: wobbling(2.0, 70.0), "rolling shutter"),
+        (lambda: wobbling(6.0, 50.0, 0.0), "rolling shutter"),  # half of the markers contradict the others
+        (lambda: wobbling(6.0, 90.0, 0.0), "rolling shutter"),  # columns jump, too
     ],
 )
 def test_a_break_is_found_and_covered(taken: object, fault: str) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import griddata
 
 from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
@@ -27,17 +28,18 @@ from extractor import (
 
 Array = NDArray[np.float64]
 YOUNG_MPA = 0.3
+PAD = {"layers": "6", "pitch_mm": "1.5"}
 SIGMA_MM = np.array([0.001, 0.001, 0.003])
 LINEAR = ForceModel(strain_factor=0.0)
 EXACT = ForceModel(
     strain_factor=0.0, strain_sigma=0.0, normal_error=0.0, shear_error=0.0, torque_error=0.0, shear_by_press=0.0,
-    centre_error_mm=0.0,
+    centre_error=0.0,
 )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def layout() -> Reference:
-    return build_layout(load_design("honeycomb", {"layers": "6", "pitch_mm": "1.5"})).reference()
+    return build_layout(load_design("honeycomb", PAD)).reference()
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +48,12 @@ def gel(layout: Reference) -> Gel:
 
 
 class Press:
-    """A known traction on the touched face, and the markers that it moves."""
+    """A known traction on the touched face, and the markers that it moves; its torque has the arms of moved places."""
 
     def __init__(
         self, gel: Gel, *balls: tuple[float, float, float], shear: float = 0.0, twist: float = 0.0
     ) -> None:
+        markers_mm = build_layout(load_design("honeycomb", PAD)).marker_xy_mm
         traction = np.zeros((len(gel.loads_mm), 3))
         for x, y, radius in balls:
             offset = gel.loads_mm - (x, y)
@@ -59,9 +62,11 @@ class Press:
             traction[:, 0] += shear * pressure - twist * offset[:, 1] * pressure
             traction[:, 1] += twist * offset[:, 0] * pressure
         force = traction * gel.area_mm2[:, None]
-        arm = np.pad(gel.loads_mm, [(0, 0), (0, 1)])
-        self.force_n, self.torque_nmm = force.sum(axis=0), np.cross(arm, force).sum(axis=0)
         self.moved = (gel.matrix.astype(float) @ traction.ravel() / YOUNG_MPA).reshape(-1, 3)
+        pressed = np.abs(traction[:, 2]) > 0
+        arm = np.pad(gel.loads_mm[pressed], [(0, 0), (0, 1)])
+        arm += griddata(markers_mm, self.moved, gel.loads_mm[pressed], "cubic")
+        self.force_n, self.torque_nmm = force.sum(axis=0), np.cross(arm, force[pressed]).sum(axis=0)
 
     def seen(self, seed: int = 0) -> Array:
         return self.moved + np.random.default_rng(seed).normal(size=self.moved.shape) * SIGMA_MM
@@ -96,7 +101,7 @@ def test_force_torque_and_utilisation_of_a_sheared_and_twisted_ball(
 
 
 def test_a_large_strain_needs_more_force(layout: Reference, gel: Gel) -> None:
-    """The strain factor grows with the square of force over area and modulus, region by region."""
+    """The strain factor grows with the square of force over area and modulus, and the radius, region by region."""
     press = Press(gel, (-3.0, 1.0, 2.0), (2.5, -1.0, 2.0))
     linear = read(layout, gel, press.seen())
     stiff = ContactReader(layout, gel, YOUNG_MPA, model=ForceModel(strain_factor=2.0)).read(
@@ -104,7 +109,8 @@ def test_a_large_strain_needs_more_force(layout: Reference, gel: Gel) -> None:
     )
     for one, other in zip(linear.regions, stiff.regions, strict=True):
         load = -one.force_n[2] / (one.area_mm2 * YOUNG_MPA)
-        assert other.force_n[2] == pytest.approx(one.force_n[2] * (1 + 2.0 * load**2), rel=1e-6)
+        radius = np.sqrt(one.area_mm2 / np.pi) / gel.thickness_mm
+        assert other.force_n[2] == pytest.approx(one.force_n[2] * (1 + 2.0 * radius * load**2), rel=1e-6)
         assert other.force_cov_n2[2, 2] > one.force_cov_n2[2, 2]
     beyond = 20 * Press(gel, (0.0, 0.0, 2.0)).moved
     largest = (

@@ -102,7 +102,7 @@ def test_pictures_are_read_as_with_the_true_layout(preset: Literal["balanced", "
         error = np.concatenate([m.xy_px - s.truth.marker_xy_px for m, s in zip(read, seen, strict=True)])
         cov = np.concatenate([markers.cov_px2 for markers in read])
         errors[name], z[name] = np.sqrt((error**2).mean()), np.sqrt(squared_distances(error, cov).mean() / 2)
-    assert errors["learnt"] < 1.05 * errors["true"] < 0.72 * errors["nominal"]
+    assert errors["learnt"] < 1.05 * errors["true"] < 0.78 * errors["nominal"]
     assert z["learnt"] < 1.05 * z["true"] < z["nominal"]
     # How true the covariances of "balanced" are, with any layout, is the reader's affair.
     assert preset == "balanced" or 0.9 < z["learnt"] < 1.2

@@ -39,9 +39,13 @@ def normals(topology: Topology) -> NDArray[np.float64]:
     return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
 
 
-def slopes(topology: Topology, xy: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+def slopes(
+    topology: Topology, xy: NDArray[np.float64], share: float, curves_at_rim: bool = False
+) -> NDArray[np.float64]:
     """(E, 2) px, the slopes at both ends of the gridlines, times their length."""
     maps = local_maps(xy, topology.ring_markers, topology.ring_vectors, topology.derivative_stencil)
+    if not curves_at_rim:
+        maps[(topology.spokes < 0).any(axis=1), :, 2:] = 0.0
     straight = np.zeros((len(topology.edges), 2))
     lines = gridlines(xy, maps, straight, topology.edges, topology.edge_vectors, share)
     return np.asarray(lines[:, 4:5] * lines[:, 5:7])
@@ -141,7 +145,7 @@ def test_scatter_bends_gridlines_as_random_markers_do(pattern: str) -> None:
     np.add.at(sums, edges, (across[:, :, None] * across[:, None])[:, None])
     rng, draws, squares = np.random.default_rng(3), 300, np.zeros(len(xy))
     for _ in range(draws):
-        leave, arrive = slopes(topology, xy + rng.normal(0.0, 1.0, xy.shape), 1.0).T
+        leave, arrive = slopes(topology, xy + rng.normal(0.0, 1.0, xy.shape), 1.0, True).T
         pull = np.zeros_like(xy)
         np.add.at(pull, edges, (across * 0.5 * (leave - arrive)[:, None])[:, None])
         squares += (np.linalg.solve(sums, pull[..., None]) ** 2).sum(axis=(1, 2)) / draws

@@ -22,8 +22,7 @@ double outward_sign(View<const double, 2> contrasts, View<const std::int32_t, 2>
 
 // px, the shift of gridline e outward of its cell; `outward` is 1 or -1.
 double outward_shift(View<const double, 2> sums, const ShiftGradients& gradients, Index e, double outward) {
-  return outward * (gradients.start[e] + gradients.end[e]) /
-         (sums(e, AA) + 2.0 * sums(e, AB) + sums(e, BB));
+  return outward * (gradients.start[e] + gradients.end[e]) / (sums(e, AA) + 2.0 * sums(e, AB) + sums(e, BB));
 }
 
 // A sum of 1, x, y and the distance of (x, y) from 0, each times a coefficient, by least squares.

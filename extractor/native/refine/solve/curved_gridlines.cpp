@@ -36,7 +36,10 @@ Array<double, 3> maps_of_shifts(const CurvedGridlines& curved, View<const double
     if (curved.hidden[m] || !std::isfinite(curved.xy(m, 0)))
       seen(m, 0) = seen(m, 1) = std::numeric_limits<double>::quiet_NaN();
   }
-  return local_maps(seen, topology.ring_markers, topology.ring_vectors, topology.derivative_stencil, limits);
+  Array<double, 3> maps =
+      local_maps(seen, topology.ring_markers, topology.ring_vectors, topology.derivative_stencil, limits);
+  update_without_rim_curves(maps, topology.spokes);
+  return maps;
 }
 
 // How the maps bend gridline e, whose chord turns by `turn` px; as gridlines has it.

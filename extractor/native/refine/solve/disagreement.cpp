@@ -140,6 +140,8 @@ Array<double, 1> variance_ratios(const GridlineSystem& system, const ShiftGradie
       at_freedom[edges(e, end)] += freedom[e];
     }
   }
+  // gridlines that are free to bend agree better than noise alone makes them
+  const double least = system.scatter_share > 0.0 ? 1.0 : limits.min_ratio;
   Array<double, 1> out({edges.size()});
   for (Index e = 0; e < edges.size(); ++e) {
     const Index a = edges(e, 0), b = edges(e, 1), side = ends_at_rim(system, e) ? 1 : 0;
@@ -148,7 +150,7 @@ Array<double, 1> variance_ratios(const GridlineSystem& system, const ShiftGradie
     const double own_square =
         limits.picture_freedom * around + at_square[a] + at_square[b] - count[e] * square[e];
     const double own_freedom = limits.picture_freedom + at_freedom[a] + at_freedom[b] - freedom[e];
-    out[e] = std::max(own_square / own_freedom, limits.min_ratio);
+    out[e] = std::max(own_square / own_freedom, least);
   }
   return out;
 }

@@ -118,6 +118,15 @@ Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> whi
   return maps;
 }
 
+void update_without_rim_curves(View<double, 3> maps, View<const std::int32_t, 2> spokes) {
+  for (Index m = 0; m < maps.size(); ++m) {
+    if (spokes(m, spokes.size(1) - 1) >= 0) continue;
+    for (Index axis = 0; axis < 2; ++axis) {
+      for (Index d = 2; d < DERIVATIVES; ++d) maps(m, axis, d) = 0.0;
+    }
+  }
+}
+
 ExtrapolatedMarkers extrapolate_markers(View<const double, 2> xy, View<const double, 3> maps,
                                         View<const std::int32_t, 2> near, View<const double, 3> offset) {
   ExtrapolatedMarkers out{Array<double, 2>(xy), Array<bool, 1>({xy.size()}, false)};

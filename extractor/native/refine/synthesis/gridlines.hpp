@@ -32,6 +32,10 @@ struct GridlineLimits {
   double firm_ridge = 0.001, weak_ridge = 0.02;
 };
 
+// Sets the second derivatives of the maps (M, 2, 5) to 0 at markers with fewer than six gridlines, spokes (M,
+// 6), for pictures whose markers scatter: from one side, scatter makes more of them than bending.
+void update_without_rim_curves(View<double, 3> maps, View<const std::int32_t, 2> spokes);
+
 // Markers (M, 2) px with predictions, and (M,) the predicted ones.
 struct ExtrapolatedMarkers {
   Array<double, 2> xy;
