@@ -96,4 +96,12 @@ CELLS = (
         "direction_tolerance = 0.56",
         "direction_tolerance = 1e9",
     ),
+    Rule(
+        "settled triangles",
+        "triangles whose corners move far are measured again",
+        "accuracy",
+        "extractor/native/cells/triangle_edges.hpp",
+        "max_passes = 2",
+        "max_passes = 1",
+    ),
 )

@@ -84,9 +84,9 @@ bool fill_line_intersections(View<const double, 1> edges, Index n, Index count, 
   return true;
 }
 
-// Moves the cells' corners to the lines' intersections.
+// Moves the cells' corners to the lines' intersections; adds the cells to `moving` that moved far.
 void update_corners(View<const double, 1> edges, Indices cells, View<double, 3> corners, View<bool, 1> good,
-                    const TriangleEdgeLimits& limits) {
+                    std::vector<Index>& moving, const TriangleEdgeLimits& limits) {
   const Index count = cells.size();
   std::array<double, 6> corner_memory{};
   const View<double, 2> moved(corner_memory.data(), {3, 2});
@@ -95,7 +95,15 @@ void update_corners(View<const double, 1> edges, Indices cells, View<double, 3> 
     const bool is_valid = edges[VALID + n] * edges[VALID + count + n] * edges[VALID + 2 * count + n] > 0.0;
     good[i] = is_valid && fill_line_intersections(edges, n, count, limits.max_corner_shift * edges[SIZE + n],
                                                   limits.min_sine, moved);
-    if (good[i]) copy<double, 2>(moved, corners[i]);
+    if (!good[i]) continue;
+    double most2 = 0.0;
+    for (Index k = 0; k < 3; ++k) {
+      const double dx = moved(k, 0) - corners(i, k, 0), dy = moved(k, 1) - corners(i, k, 1);
+      most2 = std::max(most2, dx * dx + dy * dy);
+    }
+    copy<double, 2>(moved, corners[i]);
+    const double settled = limits.settled_shift * edges[SIZE + n];
+    if (most2 > settled * settled) moving.push_back(i);
   }
 }
 
@@ -107,21 +115,25 @@ void update_triangle_corners(const image::PyramidLevel& view, View<double, 3> co
   Array<double, 1> edge_table({COLUMNS * numeric::BATCH_POINTS}, 0.0);
   const auto edges = edge_table.view();
   auto buffers = numeric::allocate_sample_buffers();
-  std::vector<Index> measured;
+  std::vector<Index> moving;
   for (Index i = 0; i < good.size(); ++i)
-    if (good[i]) measured.push_back(i);
-  const Indices all(measured.data(), {static_cast<Index>(measured.size())});
-  for (Index begin = 0; begin < all.size(); begin += BATCH_CELLS) {
-    const auto cells = all.slice(begin, std::min(begin + BATCH_CELLS, all.size()));
-    const Index count = 3 * cells.size();
-    fill_edges(corners, cells, edges);
-    fill_normals(edges, count);
-    fill_contrast_weights(image, edges, count, buffers, limits);
-    fill_profile_places(image, edges, count, limits);
-    fill_profile_areas(image, false, edges, count, buffers, limits);
-    fill_profile_areas(image, true, edges, count, buffers, limits);
-    fill_edge_lines(edges, count, limits);
-    update_corners(edges, cells, corners, good, limits);
+    if (good[i]) moving.push_back(i);
+  for (std::int64_t pass = 0; pass < limits.max_passes; ++pass) {
+    const std::vector<Index> measured(std::move(moving));
+    moving.clear();
+    const Indices all(measured.data(), {static_cast<Index>(measured.size())});
+    for (Index begin = 0; begin < all.size(); begin += BATCH_CELLS) {
+      const auto cells = all.slice(begin, std::min(begin + BATCH_CELLS, all.size()));
+      const Index count = 3 * cells.size();
+      fill_edges(corners, cells, edges);
+      fill_normals(edges, count);
+      fill_contrast_weights(image, edges, count, buffers, limits);
+      fill_profile_places(image, edges, count, limits);
+      fill_profile_areas(image, false, edges, count, buffers, limits);
+      fill_profile_areas(image, true, edges, count, buffers, limits);
+      fill_edge_lines(edges, count, limits);
+      update_corners(edges, cells, corners, good, moving, limits);
+    }
   }
 }
 

@@ -13,9 +13,12 @@ struct TriangleEdgeLimits {
   std::int64_t half_profile = 4;  // samples on each side of an edge. Chosen.
   // from profiles to the last row and column; more than half a sub-pixel step. Derived.
   double border_margin_px = 0.01;
-  // half length of a profile, in vectors from the cell's center to the edge's middle. Chosen: a second pass
-  // with shorter profiles lost more markers and made no picture more accurate.
-  double profile_reach = 0.55;
+  // half length of a profile, in vectors from the cell's center to the edge's middle. Chosen.
+  double profile_reach = 0.5;
+  // in units of the corner's distance from the center; a triangle of which a corner moves farther is measured
+  // again. Chosen: sharp cells move by 0.06, those of 6 px across by 0.15.
+  double settled_shift = 0.1;
+  std::int64_t max_passes = 2;  // Measured: rule "settled triangles".
   // of the disc in which the ink's color is measured, relative to the corner's distance from the center.
   // Chosen.
   double ink_radius = 0.2;
