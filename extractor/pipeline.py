@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -48,8 +48,8 @@ from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
-from extractor.refine.relief import without_parallax
-from extractor.result import Markers, Origin, Reason
+from extractor.refine.relief import points_without_parallax, without_parallax
+from extractor.result import Markers, Origin, Reason, VirtualMarkers
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
@@ -289,12 +289,19 @@ class ImageReader:
         refined = stages.record("refine", pad.refiner(pyramid, places, before))
         repaired = repair_markers(refined, places, pad.lattice, size)
         rows = find_row_break(topology, refined, repaired, size)
-        repaired = beside_row_break(rows, repaired)
-        xy, cov, points = without_parallax(
-            refined.appearance.parallax, topology.edges, repaired.xy_px, repaired.cov_px2, refined.points
-        )
-        repaired = stages.record("repair", RepairedMarkers(xy, cov, repaired.status))
-        virtual = partial(locate_virtual_markers, topology, repaired, points, refined.scatter)
+        apparent = beside_row_break(rows, repaired)
+        parallax, repaired = refined.appearance.parallax, apparent
+        if parallax is not None:
+            flat = without_parallax(parallax, apparent.xy_px, apparent.cov_px2)
+            repaired = RepairedMarkers(*flat, apparent.status)
+        stages.record("repair", repaired)
+
+        def virtual() -> VirtualMarkers:
+            points = refined.points
+            if parallax is not None:
+                points = points_without_parallax(parallax, topology.edges, apparent.xy_px, points)
+            return locate_virtual_markers(topology, repaired, points, refined.scatter)
+
         few = is_less_than_half_reported(repaired.xy_px, layout.xy_mm, pad.lattice.present, size)
         view, edges = pyramid.level(1), topology.edges
         quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)

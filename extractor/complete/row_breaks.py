@@ -14,6 +14,7 @@ Markers beside a break have a covariance that covers the jump, or are lost where
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,14 +34,6 @@ class RowBreakLimits(NamedTuple):
     """Limits of breaks. Lengths are in median edges, unless stated otherwise.
 
     Attributes:
-        bin: height of the strips of rows. Chosen.
-        min_gridlines: that cross a strip. Chosen.
-        most_of_layout: a third of the layout's own third difference, for a gridline to count. Chosen: a tilted view
-            maps it a tenth wrong.
-        min_rise: of a gridline across the rows, to count. Chosen.
-        disagreement: times the median squared distance of the jumps of a strip from their median, that is taken off its
-            square: all gridlines across a break jump alike, beside dirt and in a contact they do not. Chosen: with
-            2 and with 4 the same tears are found, and none in pictures with dirt, glare or contact.
         min_jump: of a strip, for a break. Chosen: 0.4 px where an edge has 20.
         ratio: of the largest jump along rows and that along columns. Chosen: pressed and twisted patterns have less
             than 2.
@@ -59,11 +52,6 @@ class RowBreakLimits(NamedTuple):
             that, the markers are covered and nothing is torn. Chosen.
     """
 
-    bin: float = 1 / 3
-    min_gridlines: int = 6
-    most_of_layout: float = 0.06
-    min_rise: float = 0.6
-    disagreement: float = 2.0
     min_jump: float = 0.02
     ratio: float = 3.0
     min_usual_jump: float = 0.03
@@ -82,6 +70,25 @@ class RowBreakLimits(NamedTuple):
 
 
 LIMITS = RowBreakLimits()
+
+
+class StripJumps(NamedTuple):
+    """The jumps of gridlines, px, by strips of the image.
+
+    Attributes:
+        edge_px: the median edge, 0 with few edges.
+        rows_px: (B,) the length of the median jump of each strip of rows, beyond the disagreement of its gridlines; NaN
+            with few gridlines.
+        largest_px, usual_px: the largest one, and the root mean square; NaN without any.
+        largest_column_px, usual_column_px: the same of strips of columns, with their disagreement.
+    """
+
+    edge_px: float
+    rows_px: Points
+    largest_px: float
+    usual_px: float
+    largest_column_px: float
+    usual_column_px: float
 
 
 class RowBreak(NamedTuple):
@@ -115,21 +122,16 @@ def find_row_break(
         markers: of the image.
         size_px: width and height of the image.
     """
-    status = np.where(np.isfinite(refined.xy_px[:, 0]), Status.MEASURED, Status.LOST).astype(np.uint8)
-    measured = RepairedMarkers(refined.xy_px, refined.cov_px2, status)
-    edge, rows, columns = native.measure_jumps(measured, topology, LIMITS)
+    jumps = native.measure_jumps(refined.xy_px, topology)
+    edge, largest = jumps.edge_px, jumps.largest_px
     if edge == 0:
         return NO_BREAK
-    known, known_columns = rows[np.isfinite(rows)], columns[np.isfinite(columns)]
-    if min(len(known), len(known_columns)) == 0:
+    is_one = largest > max(LIMITS.min_jump * edge, LIMITS.ratio * jumps.largest_column_px)
+    least = max(LIMITS.min_usual_jump * edge, LIMITS.usual_ratio * jumps.usual_column_px)
+    if math.isnan(jumps.largest_column_px) or not (is_one or jumps.usual_px > least):
         return _lost_along_a_row(topology, markers, size_px, edge)
-    usual, usual_column = np.sqrt(np.mean(known**2)), np.sqrt(np.mean(known_columns**2))
-    rows, largest = np.nan_to_num(rows), float(known.max())
-    is_one = largest > max(LIMITS.min_jump * edge, LIMITS.ratio * known_columns.max())
-    is_usual = usual > max(LIMITS.min_usual_jump * edge, LIMITS.usual_ratio * usual_column)
-    if not is_one and not is_usual:
-        return _lost_along_a_row(topology, markers, size_px, edge)
-    middle, squares = (np.arange(len(rows), dtype=np.float64) + 0.5) * LIMITS.bin * edge, rows**2
+    rows = np.nan_to_num(jumps.rows_px)
+    middle, squares = (np.arange(len(rows), dtype=np.float64) + 0.5) * native.STRIP_EDGES * edge, rows**2
     near = np.abs(middle - np.average(middle, weights=squares)) < LIMITS.spread * edge
     if squares[near].sum() < LIMITS.concentrated * squares.sum():
         return RowBreak("rolling shutter", largest, middle, rows, edge)
@@ -193,12 +195,12 @@ def _goes_on_across(topology: Topology, xy: Points, rows_px: Points, edge: float
         above, below = (extrapolate_pattern(part, topology).xy for part in (above, below))
     apart = np.hypot(*(above - below)[~np.isfinite(xy[:, 0])].T)
     apart = apart[np.isfinite(apart)]
-    return len(apart) >= LIMITS.min_gridlines and bool(np.median(apart) < LIMITS.most_apart * edge)
+    return len(apart) >= native.MIN_STRIP_GRIDLINES and bool(np.median(apart) < LIMITS.most_apart * edge)
 
 
 def _lost_lines(place: Points, known: NDArray[np.bool_], edge: float) -> Points:
     """(B,) px, the lines around which most of at least ``min_lost`` markers are lost."""
-    lines = np.arange(0.0, place.max(initial=0.0) + edge, LIMITS.bin * edge)
+    lines = np.arange(0.0, place.max(initial=0.0) + edge, native.STRIP_EDGES * edge)
     around = np.abs(place - lines[:, None]) < LIMITS.lost_reach * edge
     lost = np.count_nonzero(around & ~known, axis=1)
     share = lost / np.maximum(np.count_nonzero(around, axis=1), 1)

@@ -130,15 +130,18 @@ def unknown_parallax(outward: float, across: float, size_px: Points) -> Parallax
     return Parallax(0.5 * (size_px - 1.0), foot_px**2 * np.eye(2), 0.0, LIMITS.unseen * slope)
 
 
-def without_parallax(
-    parallax: Parallax | None, edges: NDArray[np.int32], xy_px: Points, cov_px2: Points, points_px: Points
-) -> tuple[Points, Points, Points]:
-    """Markers (M, 2), covariances (M, 2, 2) and points (E, m, 3) of gridlines (E, 2) in the plane of the black.
+def without_parallax(parallax: Parallax, xy_px: Points, cov_px2: Points) -> tuple[Points, Points]:
+    """Markers (M, 2) and covariances (M, 2, 2) in the plane of the black."""
+    return xy_px - parallax.shift_px(xy_px), cov_px2 + parallax.cov_px2(xy_px)
+
+
+def points_without_parallax(
+    parallax: Parallax, edges: NDArray[np.int32], xy_px: Points, points_px: Points
+) -> Points:
+    """Points (E, m, 3) of gridlines (E, 2) in the plane of the black; xy (M, 2) are the markers as they appear.
 
     The variance of a point is across its gridline.
     """
-    if parallax is None:
-        return xy_px, cov_px2, points_px
     chord = xy_px[edges[:, 1]] - xy_px[edges[:, 0]]
     normal = np.stack([-chord[:, 1], chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1, keepdims=True)
     flat = points_px[..., :2].reshape(-1, 2)
@@ -146,7 +149,7 @@ def without_parallax(
     moved[..., :2] -= parallax.shift_px(flat).reshape(moved[..., :2].shape)
     of_shift = parallax.cov_px2(flat).reshape(*moved.shape[:2], 2, 2)
     moved[..., 2] += np.einsum("ei,ejik,ek->ej", normal, of_shift, normal)
-    return xy_px - parallax.shift_px(xy_px), cov_px2 + parallax.cov_px2(xy_px), moved
+    return moved
 
 
 def _outward_offsets(topology: Topology, xy_px: Points, points_px: Points) -> tuple[Points, Points]:

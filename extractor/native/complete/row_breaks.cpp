@@ -14,7 +14,7 @@ namespace cmp::complete {
 
 namespace {
 
-constexpr std::uint8_t MEASURED = 1;  // Status in extractor/result.py
+constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 
 using Vector = std::array<double, 2>;
 
@@ -34,9 +34,9 @@ double length(double x, double y) { return std::sqrt(x * x + y * y); }
 
 // The gridlines of four measured markers, and the lengths of all measured edges; a
 // jump is a third of the third difference.
-std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::Topology& topology,
+std::vector<Gridline> gridlines_of(View<const double, 2> xy, const layout::Topology& topology,
                                    const JumpLimits& limits, std::vector<double>& lengths) {
-  const auto is_measured = [&](Index m) { return m >= 0 && markers.status[m] == MEASURED; };
+  const auto is_measured = [&](Index m) { return m >= 0 && std::isfinite(xy(m, 0)); };
   std::vector<Gridline> found;
   double uu = 0, uv = 0, vv = 0;
   Vector by_u{}, by_v{};
@@ -44,7 +44,7 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
     const Index a = topology.edges(e, 0), b = topology.edges(e, 1);
     if (!is_measured(a) || !is_measured(b)) continue;
     Gridline line{e, {}, {}, {}};
-    for (int k = 0; k < 2; ++k) line.rise[k] = markers.xy_px(b, k) - markers.xy_px(a, k);
+    for (int k = 0; k < 2; ++k) line.rise[k] = xy(b, k) - xy(a, k);
     lengths.push_back(length(line.rise[0], line.rise[1]));
     const Index before = topology.next_markers(e, 0), after = topology.next_markers(e, 1);
     const double own = length(topology.third_differences(e, 0), topology.third_differences(e, 1));
@@ -52,8 +52,8 @@ std::vector<Gridline> gridlines_of(const LocatedMarkers& markers, const layout::
     const double u = topology.edge_vectors(e, 0), v = topology.edge_vectors(e, 1);
     uu += u * u, uv += u * v, vv += v * v;
     for (int k = 0; k < 2; ++k) {
-      line.middle[k] = (markers.xy_px(a, k) + markers.xy_px(b, k)) / 2;
-      line.jump[k] = line.rise[k] - (markers.xy_px(after, k) - markers.xy_px(before, k)) / 3;
+      line.middle[k] = (xy(a, k) + xy(b, k)) / 2;
+      line.jump[k] = line.rise[k] - (xy(after, k) - xy(before, k)) / 3;
       by_u[k] += u * line.rise[k], by_v[k] += v * line.rise[k];
     }
     found.push_back(line);
@@ -97,7 +97,7 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
     const std::size_t at = --next[one.strip];
     x[at] = one.jump[0], y[at] = one.jump[1];
   }
-  Array<double, 1> jump({static_cast<Index>(end.size())}, std::numeric_limits<double>::quiet_NaN());
+  Array<double, 1> jump({static_cast<Index>(end.size())}, NONE);
   for (std::size_t s = 0; s < end.size(); ++s) {
     const std::size_t count = end[s] - next[s];
     if (static_cast<Index>(count) < limits.min_gridlines) continue;
@@ -116,17 +116,30 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
   return jump;
 }
 
+// The largest jump and the root mean square of the known ones; NaN without any.
+std::pair<double, double> largest_and_usual(View<const double, 1> jumps) {
+  double largest = NONE, squares = 0.0, count = 0.0;
+  for (const double jump : jumps) {
+    if (std::isnan(jump)) continue;
+    largest = count > 0.0 ? std::max(largest, jump) : jump;
+    squares += jump * jump, count += 1.0;
+  }
+  return {largest, std::sqrt(squares / count)};
+}
+
 }  // namespace
 
-StripJumps measure_jumps(const LocatedMarkers& markers, const layout::Topology& topology,
+StripJumps measure_jumps(View<const double, 2> xy, const layout::Topology& topology,
                          const JumpLimits& limits) {
   std::vector<double> lengths;
-  const auto lines = gridlines_of(markers, topology, limits, lengths);
+  const auto lines = gridlines_of(xy, topology, limits, lengths);
   if (static_cast<Index>(lengths.size()) < limits.min_gridlines)
-    return {0.0, Array<double, 1>({0}), Array<double, 1>({0})};
+    return {0.0, Array<double, 1>({0}), NONE, NONE, NONE, NONE};
   const double edge = median(lengths);
-  return {edge, jumps_along(lines, 1, edge, limits.disagreement, limits),
-          jumps_along(lines, 0, edge, 0.0, limits)};
+  Array<double, 1> rows = jumps_along(lines, 1, edge, limits.disagreement, limits);
+  const auto [largest, usual] = largest_and_usual(rows);
+  const auto [largest_column, usual_column] = largest_and_usual(jumps_along(lines, 0, edge, 0.0, limits));
+  return {edge, std::move(rows), largest, usual, largest_column, usual_column};
 }
 
 }  // namespace cmp::complete
