@@ -22,7 +22,7 @@ from cmpdesign.cli.options.completions import COMPLETIONS
 from cmpdesign.cli.options.texts import parse_pairs, parse_pixels, parse_reading_response
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish
-from cmpdesign.inputs.options import Response, Written, options_of
+from cmpdesign.inputs.options import Response, Usual, Written, options_of
 from cmpdesign.tracking.jobs.options import SequenceOptions
 from cmpdesign.watch import watched
 
@@ -184,7 +184,8 @@ def _parameter(taken: _Taken, meanings: Mapping[str, str]) -> inspect.Parameter:
     meaning = meanings[name].partition("; None: ")[0] if written.needed else meanings[name]
     words: dict[str, Any] = {"help": _help(meaning), "metavar": written.metavar}
     words["autocompletion"] = COMPLETIONS.get(name)
-    if kind in (int, int | None, float, float | None):
+    # a record of options checks its own limits, and its message names the value
+    if kind in (int, int | None, float, float | None) and not isinstance(written, Usual):
         words |= {"min": written.least, "max": written.most}
     if taken.is_argument:
         several = kind == list[str] or kind == list[Path]
