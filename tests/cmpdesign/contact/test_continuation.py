@@ -47,6 +47,7 @@ def pressed(
     return surface, pattern, pattern + noise
 
 
+@pytest.mark.slow
 def test_surfaces_are_nearer_than_patterns_and_their_deviations_are_true() -> None:
     covariance = np.broadcast_to(np.diag(NOISE_MM**2), (len(XY_MM), 3, 3)).copy()
     before, after, d2 = [], [], []

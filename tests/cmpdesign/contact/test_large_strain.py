@@ -113,6 +113,7 @@ def linear_strain(load_mpa: float) -> tuple[float, Array]:
     return largest_strain(LAYER, moved, traction, step), line[[0, 2]]
 
 
+@pytest.mark.slow
 def test_error_of_linear_theory_grows_with_the_strain() -> None:
     """About half of the strain, as a share of the largest displacement; five percent where the warning begins."""
     layer = Layer()

@@ -74,6 +74,7 @@ def held(basis: skfem.Basis, axis: int) -> NDArray[np.int64]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nu", "limit"), [(0.3, 0.004), (0.45, 0.01)])
 def test_layer_moves_as_finite_elements_say(nu: float, limit: float) -> None:
     """Displacements agree in all three directions, at and below the surface, under normal and tangential loads.
