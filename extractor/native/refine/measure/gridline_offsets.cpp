@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "numeric/median.hpp"
-#include "refine/measure/matched_filter.hpp"
 #include "refine/synthesis/gridline_sides.hpp"
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/station_sums.hpp"

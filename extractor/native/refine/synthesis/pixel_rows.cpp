@@ -92,19 +92,4 @@ void fill_values(const ComparedImages& images, const RowBlock& block, const Bloc
   fill_drawn(images.encoded, block, out);
 }
 
-void fill_residuals(const ComparedImages& images, const RowBlock& block, const BlockRows& rows,
-                    const SideLight& light, const PixelColumn& shares, Residuals& out) {
-  fill_values(images, block, rows, light, shares, out);
-  const float contrast0 = light.contrast[0], contrast1 = light.contrast[1], contrast2 = light.contrast[2];
-  const Index count = block.pixels();
-#pragma omp simd
-  for (Index k = 0; k < count; ++k) {
-    const float r0 = out.residual(0, k), r1 = out.residual(1, k), r2 = out.residual(2, k);
-    const float d0 = contrast0 * out.drawn[0][k].slope, d1 = contrast1 * out.drawn[1][k].slope;
-    const float d2 = contrast2 * out.drawn[2][k].slope;
-    out.projection[k] = d0 * r0 + d1 * r1 + d2 * r2;
-    out.information[k] = d0 * d0 + d1 * d1 + d2 * d2;
-  }
-}
-
 }  // namespace cmp::refine

@@ -167,8 +167,4 @@ void fill_rows(const RowBlock& block, Index first, const RowFrame& frame, double
 void fill_values(const ComparedImages& images, const RowBlock& block, const BlockRows& rows,
                  const SideLight& light, const PixelColumn& shares, Residuals& out);
 
-// The same, with projection and information.
-void fill_residuals(const ComparedImages& images, const RowBlock& block, const BlockRows& rows,
-                    const SideLight& light, const PixelColumn& shares, Residuals& out);
-
 }  // namespace cmp::refine

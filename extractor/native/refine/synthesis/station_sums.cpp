@@ -29,6 +29,7 @@ void fill_station_columns(const RowBlock& block, const PixelGeometry& geometry, 
 
 void accumulate_station_sums(const RowBlock& block, const PixelGeometry& line, GridlinePixels& pixels,
                              View<double, 2> sums) {
+  if (sums.size() == 0) return;
   const auto intervals = static_cast<float>(sums.size() + 1);
   run_loop<fill_station_columns>(block, line, intervals, pixels);
   const Index count = block.pixels();
