@@ -98,6 +98,7 @@ class UnevenDotGain(NamedTuple):
 
 
 EVEN = UnevenDotGain(0.0, 0.0)
+REGISTERED = np.zeros((3, 2))  # red, green, blue
 
 
 class Estimate(NamedTuple):
@@ -122,6 +123,7 @@ class Estimate(NamedTuple):
         reading: gridlines and levels that the last step by synthesis compared with the image; None before the first.
         dot_gain: distance by which the sides of all cells have moved outward, px.
         uneven_dot_gain: its changes over the image.
+        ink_shift: (3, 2) shifts of the inks in the layout, in units of the mean edge; their mean is 0.
         scatter: of the markers, each by itself.
         convergence_cov_px2: (M, 2, 2) covariance of the remaining error after the last step; None before it.
     """
@@ -143,6 +145,7 @@ class Estimate(NamedTuple):
     reading: GridlineReading | None = None
     dot_gain: float = 0.0
     uneven_dot_gain: UnevenDotGain = EVEN
+    ink_shift: NDArray[np.float64] = REGISTERED
     scatter: MarkerScatter = NO_SCATTER
     convergence_cov_px2: NDArray[np.float64] | None = None
 

@@ -24,12 +24,14 @@ class ProfileStep(NamedTuple):
         profile_weight: (E,) 0 to 1, similarity of each gridline to the pattern.
         weight: (E,) 0 to 1, with which it was used.
         dot_gain: px.
+        ink_shift: as in ``Estimate``.
         solution: the markers after the step.
     """
 
     profile_weight: NDArray[np.float64]
     weight: NDArray[np.float64]
     dot_gain: float
+    ink_shift: NDArray[np.float64]
     solution: StepSolution
 
 
@@ -58,5 +60,6 @@ def profile_step(
         The estimate after the round, and (E,) 0 to 1, similarity of gridlines to the pattern.
     """
     step = native.profile_step(view, lines, contrasts, estimate, topology, stations)
-    after = with_solution(estimate, step.solution, weight=step.weight, dot_gain=step.dot_gain)
+    inks = {"dot_gain": step.dot_gain, "ink_shift": step.ink_shift}
+    after = with_solution(estimate, step.solution, weight=step.weight, **inks)
     return after, step.profile_weight

@@ -190,6 +190,7 @@ class Refiner:
         profiles.
         """
         xy, cov, unaccepted, all_accepted = accept_markers(estimate, places, self._topology)
+        xy, cov = with_shifted_inks(self._topology, estimate, xy, cov)
         if all_accepted:
             return self._refined_markers(view, estimate, xy, cov, ~unaccepted, places)
         moved = with_pattern_moved(self._topology, estimate)
@@ -223,6 +224,23 @@ class Refiner:
         return RefinedMarkers(
             xy, cov, explained, blur, noise, appearance, points, estimate.scatter.at_scale(scale)
         )
+
+
+def with_shifted_inks(
+    topology: Topology, estimate: Estimate, xy: NDArray[np.float64], cov: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Markers (M, 2) and covariances (M, 2, 2) of a pad with shifted inks, from the places on which the inks agree.
+
+    Such a marker has two places: this one, and the crossing of its gridlines. It lies in the middle, and the
+    covariance covers both.
+    """
+    if not estimate.ink_shift.any():
+        return xy, cov
+    reading = estimate.reading
+    assert reading is not None
+    half = 0.5 * measure.crossing_shifts(estimate.ink_shift, reading.lines, estimate.maps, topology)
+    variance = 0.5 * (half**2).sum(axis=1)
+    return xy + half, cov + variance[:, None, None] * np.eye(2)
 
 
 def rescaled(estimate: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estimate:

@@ -49,6 +49,7 @@ class SynthesisStep(NamedTuple):
         bend_variance: (E,) px^2.
         dot_gain: px.
         uneven_dot_gain: its changes over the image.
+        ink_shift: as in ``Estimate``.
         sigma: px, the blur after the step.
         levels: of the inks at that blur.
         is_read: (E,) bool, the gridlines that were read.
@@ -60,6 +61,7 @@ class SynthesisStep(NamedTuple):
     bend_variance: NDArray[np.float64]
     dot_gain: float
     uneven_dot_gain: UnevenDotGain
+    ink_shift: NDArray[np.float64]
     sigma: float
     levels: InkLevels
     is_read: NDArray[np.bool_]
@@ -126,6 +128,7 @@ class SynthesisSolver:
         Blur or dot gain that has changed, bending that was not drawn, and markers that scatter are drawn otherwise.
         """
         change_px = abs(after.sigma - before.sigma) + abs(after.dot_gain - before.dot_gain)
+        change_px += step.edge_px * float(abs(after.ink_shift - before.ink_shift).max())
         if change_px >= SMALL_CHANGE * before.sigma:
             return False
         new_bend = 0.0 if before.bend.any() else typical_bending(after.bend, step.is_read, after.information)
@@ -148,5 +151,6 @@ class SynthesisSolver:
             levels=step.levels,
             dot_gain=step.dot_gain,
             uneven_dot_gain=step.uneven_dot_gain,
+            ink_shift=step.ink_shift,
         )
         return after, step

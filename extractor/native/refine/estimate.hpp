@@ -17,10 +17,11 @@ struct PatternState {
   double sigma;                     // the blur, px
   double noise;                     // gray levels, one channel
   double dot_gain;                  // px
+  View<const double, 2> ink_shift;  // (3, 2) of the inks in the layout, in units of the mean edge
   MarkerScatter scatter;
 
   CMP_RECORD("extractor.refine.estimate.Estimate", xy, hidden, maps, roughness, bend, weight, sigma, noise,
-             dot_gain, scatter)
+             dot_gain, ink_shift, scatter)
 };
 
 // Markers before refinement.

@@ -26,8 +26,11 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
   const UnevenDotGain uneven = measure_uneven_dot_gain(
       sums, gradients, contrasts, state.xy, topology, static_cast<double>(view.image.size(1)),
       static_cast<double>(view.image.size(0)), limits.dot_gain);
-  Array<double, 1> dot_gain_offset =
-      update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
+  Array<double, 1> dot_gain_offset = dot_gain_offsets(sums, contrasts, edge_cells, dot_gain);
+  Array<double, 2> ink_shift =
+      measure_ink_shift(sums, gradients, lines, state, topology, limits.ink_shift);
+  update_without_offsets(sums, gradients, dot_gain_offset);
+  update_without_ink_shift(sums, gradients, lines, ink_shift, state, topology);
   EliminatedBending bent = update_for_bending(
       sums, gradients, {state.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
       lines, edges, state.noise, rule, limits.step);
@@ -56,6 +59,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
           std::move(bent.variance),
           dot_gain,
           uneven,
+          std::move(ink_shift),
           blur_px,
           std::move(after),
           std::move(is_read),

@@ -8,6 +8,7 @@
 #include "refine/drawn_pattern.hpp"
 #include "refine/estimate.hpp"
 #include "refine/measure/dot_gain.hpp"
+#include "refine/measure/ink_shift.hpp"
 #include "refine/refinement_step.hpp"
 
 namespace cmp::refine {
@@ -17,6 +18,7 @@ struct SynthesisLimits {
   MisfitRule rule = {3, 8, 0.0};  // of the gridlines' weights; a pixel has three values. Chosen.
   StepLimits step;
   DotGainLimits dot_gain;
+  InkShiftLimits ink_shift;
   DrawingLimits drawing;
 };
 
@@ -36,13 +38,14 @@ struct SynthesisStep {
   Array<double, 1> bend_variance;  // (E,) px^2
   double dot_gain;                 // px
   UnevenDotGain uneven_dot_gain;
-  double sigma;  // px
+  Array<double, 2> ink_shift;  // (3, 2) as in PatternState
+  double sigma;                // px
   LevelArrays levels;
   Array<bool, 1> is_read;  // (E,)
   double edge_px;
 
   CMP_RECORD("extractor.refine.synthesis_steps.SynthesisStep", reading, solution, bend_variance, dot_gain,
-             uneven_dot_gain, sigma, levels, is_read, edge_px)
+             uneven_dot_gain, ink_shift, sigma, levels, is_read, edge_px)
 };
 
 // Draws the pattern into the picture (H, W, 3), compares it with the image, also at `stations` stations of

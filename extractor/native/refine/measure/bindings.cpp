@@ -4,6 +4,7 @@
 #include "refine/measure/dot_gain.hpp"
 #include "refine/measure/gridline_offsets.hpp"
 #include "refine/measure/gridline_weights.hpp"
+#include "refine/measure/ink_shift.hpp"
 #include "refine/measure/marker_scatter.hpp"
 
 namespace cmp::refine {
@@ -14,6 +15,7 @@ void add_measure(nb::module_ module) {
   bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
   bind<&short_edge>(module, "short_edge", {"xy", "edges", "rarity"});
   bind<&markers_without_dot_gain>(module, "markers_without_dot_gain", {"xy", "cells", "dot_gain"});
+  bind<&crossing_shifts>(module, "crossing_shifts", {"shift", "lines", "maps", "topology"});
   module.attr("MIN_NOISE") = GridlineWeightLimits{}.min_noise;
   module.attr("MIN_SIGMA_PX") = GridlineWeightLimits{}.min_sigma_px;
 }
