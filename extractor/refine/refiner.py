@@ -34,6 +34,7 @@ from extractor.refine.first_look import initial_appearance, update_blur_and_blee
 from extractor.refine.measure.dot_gain import markers_without_dot_gain
 from extractor.refine.measure.gridline_offsets import measure_virtual_markers
 from extractor.refine.measure.gridline_weights import short_edge
+from extractor.refine.measure.shifted_inks import ShiftedInks
 from extractor.refine.outliers import correct_outliers
 from extractor.refine.profile_rounds import profile_step
 from extractor.refine.recovered_markers import fill_recovered_markers
@@ -190,7 +191,8 @@ class Refiner:
         profiles.
         """
         xy, cov, unaccepted, all_accepted = accept_markers(estimate, places, self._topology)
-        xy, cov = with_shifted_inks(self._topology, estimate, xy, cov)
+        if inks := shifted_inks(self._topology, estimate):
+            xy, cov = inks.markers(xy, cov)
         if all_accepted:
             return self._refined_markers(view, estimate, xy, cov, ~unaccepted, places)
         moved = with_pattern_moved(self._topology, estimate)
@@ -211,6 +213,8 @@ class Refiner:
         scale, reading = view.scale, estimate.reading
         assert reading is not None
         points = measure_virtual_markers(view, reading)
+        if inks := shifted_inks(self._topology, estimate):
+            points = inks.points(points, scale)
         xy, cov = native.at_full_scale(xy, cov, places, scale)
         size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
         if self._topology.cell_height != 0.0:
@@ -226,21 +230,13 @@ class Refiner:
         )
 
 
-def with_shifted_inks(
-    topology: Topology, estimate: Estimate, xy: NDArray[np.float64], cov: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Markers (M, 2) and covariances (M, 2, 2) of a pad with shifted inks, from the places on which the inks agree.
-
-    Such a marker has two places: this one, and the crossing of its gridlines. It lies in the middle, and the
-    covariance covers both.
-    """
+def shifted_inks(topology: Topology, estimate: Estimate) -> ShiftedInks | None:
+    """The shifts of the inks; None where no ink lies off."""
     if not estimate.ink_shift.any():
-        return xy, cov
+        return None
     reading = estimate.reading
     assert reading is not None
-    half = 0.5 * measure.crossing_shifts(estimate.ink_shift, reading.lines, estimate.maps, topology)
-    variance = 0.5 * (half**2).sum(axis=1)
-    return xy + half, cov + variance[:, None, None] * np.eye(2)
+    return ShiftedInks(topology, estimate.ink_shift, reading.lines, estimate.maps)
 
 
 def rescaled(estimate: Estimate, old: PyramidLevel, view: PyramidLevel) -> Estimate:

@@ -27,10 +27,10 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
       sums, gradients, contrasts, state.xy, topology, static_cast<double>(view.image.size(1)),
       static_cast<double>(view.image.size(0)), limits.dot_gain);
   Array<double, 1> dot_gain_offset = dot_gain_offsets(sums, contrasts, edge_cells, dot_gain);
-  Array<double, 2> ink_shift =
-      measure_ink_shift(sums, gradients, lines, state, topology, limits.ink_shift);
+  Array<double, 2> ink_shift = measure_ink_shift(sums, gradients, lines, state.ink_shift, state.maps, sigma,
+                                                 topology, limits.ink_shift);
   update_without_offsets(sums, gradients, dot_gain_offset);
-  update_without_ink_shift(sums, gradients, lines, ink_shift, state, topology);
+  update_without_ink_shift(sums, gradients, lines, state.ink_shift, ink_shift, state.maps, topology);
   EliminatedBending bent = update_for_bending(
       sums, gradients, {state.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
       lines, edges, state.noise, rule, limits.step);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "numeric/median.hpp"
@@ -14,8 +15,9 @@ namespace cmp::refine {
 
 namespace {
 
-constexpr double DEVIATION_OF_MEDIAN = 1.4826;       // of a normal variable, over its median distance. Derived.
-constexpr double ERROR_OF_MEDIAN = 1.2533141373155;  // of many normal variables, over that of their mean. Derived.
+constexpr double DEVIATION_OF_MEDIAN = 1.4826;  // of a normal variable, over its median distance. Derived.
+constexpr double ERROR_OF_MEDIAN =
+    1.2533141373155;  // of many normal variables, over that of their mean. Derived.
 
 struct Vector {
   double x = 0.0, y = 0.0;
@@ -70,11 +72,34 @@ Index ink_beside(const layout::Topology& topology, Index e) {
   return -1;
 }
 
-// The shifts of cells of one ink, in the layout, and their middle.
+// The shift of a cell in the image, px, by its three sides (3,); none where one is not read.
+std::optional<Vector> cell_shift(View<const double, 2> sums, const ShiftGradients& gradients,
+                                 View<const double, 2> lines, View<const std::int32_t, 1> sides,
+                                 double min_determinant) {
+  VectorFit fit;
+  for (Index k = 0; k < sides.size(); ++k) {
+    const Index e = sides[k];
+    const double whole = sums(e, AA) + 2.0 * sums(e, AB) + sums(e, BB);
+    if (!(sums(e, AA) > 0.0 && whole > 0.0)) return std::nullopt;
+    fit.add(-lines(e, UY), lines(e, UX), (gradients.start[e] + gradients.end[e]) / whole);
+  }
+  return fit.is_determined(min_determinant) ? std::optional(fit.solution()) : std::nullopt;
+}
+
+// The shifts of the cells of one ink, in the layout, and their median with its error.
 struct CellShifts {
-  std::vector<double> u, v;
   Vector middle, error;
 
+  Index size() const { return static_cast<Index>(u_.size()); }
+  // px, of a cell
+  double edge_px() const { return std::sqrt(area_px2_ / static_cast<double>(size())); }
+  void add(const Vector& shift_px, const MeanMap& map) {
+    if (map.determinant() == 0.0) return;
+    const auto [u, v] = map.in_layout(shift_px);
+    u_.push_back(u);
+    v_.push_back(v);
+    area_px2_ += std::abs(map.determinant());
+  }
   void fill_middle() {
     const auto of = [](std::vector<double>& values, double& error) {
       const View<double, 1> all(values.data(), {static_cast<Index>(values.size())});
@@ -84,56 +109,46 @@ struct CellShifts {
       error = ERROR_OF_MEDIAN * spread / std::sqrt(static_cast<double>(values.size()));
       return middle;
     };
-    middle = {of(u, error.x), of(v, error.y)};
+    middle = {of(u_, error.x), of(v_, error.y)};
   }
+
+ private:
+  std::vector<double> u_, v_;
+  double area_px2_ = 0.0;
 };
 
 }  // namespace
 
 Array<double, 2> measure_ink_shift(View<const double, 2> sums, const ShiftGradients& gradients,
-                                   View<const double, 2> lines, const PatternState& state,
-                                   const layout::Topology& topology, const InkShiftLimits& limits) {
-  Array<double, 2> none({SHIFTED_INKS, 2}, 0.0);
+                                   View<const double, 2> lines, View<const double, 2> drawn,
+                                   View<const double, 3> maps, double sigma, const layout::Topology& topology,
+                                   const InkShiftLimits& limits) {
   std::array<CellShifts, SHIFTED_INKS> inks;
-  double edge_px2 = 0.0, count = 0.0;
   for (Index i = 0; i < topology.cells.size(); ++i) {
     const Index ink = topology.cell_color[i];
     if (ink >= SHIFTED_INKS) continue;
-    VectorFit fit;
-    bool is_read = true;
-    for (Index k = 0; k < 3; ++k) {
-      const Index e = topology.cell_edges(i, k);
-      const double whole = sums(e, AA) + 2.0 * sums(e, AB) + sums(e, BB);
-      is_read = is_read && sums(e, AA) > 0.0 && whole > 0.0;
-      if (is_read) fit.add(-lines(e, UY), lines(e, UX), (gradients.start[e] + gradients.end[e]) / whole);
-    }
-    if (!is_read || !fit.is_determined(limits.min_determinant)) continue;
-    const MeanMap map(state.maps, topology.cells[i]);
-    if (map.determinant() == 0.0) continue;
-    const Vector shift = map.in_layout(fit.solution());
-    inks[ink].u.push_back(shift.x);
-    inks[ink].v.push_back(shift.y);
-    edge_px2 += std::abs(map.determinant());
-    count += 1.0;
+    const auto shift = cell_shift(sums, gradients, lines, topology.cell_edges[i], limits.min_determinant);
+    if (shift) inks[ink].add(*shift, MeanMap(maps, topology.cells[i]));
   }
+  Array<double, 2> out({SHIFTED_INKS, 2}, 0.0);
   Vector mean;
   for (CellShifts& ink : inks) {
-    if (static_cast<Index>(ink.u.size()) < limits.min_cells) return none;
+    if (ink.size() < limits.min_cells) return out;
     ink.fill_middle();
     mean = {mean.x + ink.middle.x / SHIFTED_INKS, mean.y + ink.middle.y / SHIFTED_INKS};
   }
-  Array<double, 2> out({SHIFTED_INKS, 2});
   const auto shift = out.view();
-  const double least = limits.min_shift * state.sigma / std::sqrt(edge_px2 / count);
   bool is_seen = false;
   for (Index ink = 0; ink < SHIFTED_INKS; ++ink) {
-    const auto& [x, y] = inks[ink].middle;
-    shift(ink, 0) = state.ink_shift(ink, 0) + x - mean.x;
-    shift(ink, 1) = state.ink_shift(ink, 1) + y - mean.y;
-    const double error = limits.deviations * std::hypot(inks[ink].error.x, inks[ink].error.y);
-    is_seen = is_seen || std::hypot(shift(ink, 0), shift(ink, 1)) > std::max(least, error);
+    const CellShifts& own = inks[ink];
+    shift(ink, 0) = drawn(ink, 0) + own.middle.x - mean.x;
+    shift(ink, 1) = drawn(ink, 1) + own.middle.y - mean.y;
+    const double least = std::max(limits.min_shift * sigma / own.edge_px(),
+                                  limits.deviations * std::hypot(own.error.x, own.error.y));
+    is_seen = is_seen || std::hypot(shift(ink, 0), shift(ink, 1)) > least;
   }
-  return is_seen ? std::move(out) : std::move(none);
+  if (!is_seen) shift.fill(0.0);
+  return out;
 }
 
 Array<double, 1> ink_offsets(View<const double, 2> shift, View<const double, 2> lines,
@@ -151,13 +166,13 @@ Array<double, 1> ink_offsets(View<const double, 2> shift, View<const double, 2> 
 }
 
 void update_without_ink_shift(View<double, 2> sums, ShiftGradients& gradients, View<const double, 2> lines,
-                              View<const double, 2> shift, const PatternState& state,
-                              const layout::Topology& topology) {
-  Array<double, 2> change(shift);
+                              View<const double, 2> drawn, View<const double, 2> found,
+                              View<const double, 3> maps, const layout::Topology& topology) {
+  Array<double, 2> change(found);
   for (Index ink = 0; ink < SHIFTED_INKS; ++ink) {
-    for (Index axis = 0; axis < 2; ++axis) change(ink, axis) -= state.ink_shift(ink, axis);
+    for (Index axis = 0; axis < 2; ++axis) change(ink, axis) -= drawn(ink, axis);
   }
-  update_without_offsets(sums, gradients, ink_offsets(change, lines, state.maps, topology));
+  update_without_offsets(sums, gradients, ink_offsets(change, lines, maps, topology));
 }
 
 void update_with_offsets(View<double, 2> lines, View<const double, 1> offset) {
