@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from extractor import Reference
     from extractor.contact import ContactForce
 
-MOST_CAMERA_PIXELS = 8_000_000  # of a frame of the browser's camera
+MAX_CAMERA_PIXELS = 8_000_000  # of a frame of the browser's camera
 JPEG_QUALITY = 80  # of a shown frame; the reader gets the frame itself
 WAIT_S = 1.0  # for a new frame, before the connection is looked at again
 _RATE_FRAMES = 30  # over which the rate is counted
@@ -197,7 +197,7 @@ class CameraReader:
         """
         now_s, image, problem = time.monotonic(), None, ""
         try:
-            image = decode_bytes(data, "the frame", MOST_CAMERA_PIXELS)
+            image = decode_bytes(data, "the frame", MAX_CAMERA_PIXELS)
         except CmpDesignError as error:
             problem = str(error)
         self._times.append(now_s)
@@ -314,8 +314,8 @@ def contact_document(contact: ContactForce) -> dict[str, Any]:
         values |= {
             "force_n": contact.force_n.round(4).tolist(),
             "torque_nmm": contact.torque_nmm.round(3).tolist(),
-            "most_pressure_mpa": round(float(-traction[:, 2].min()), 5),
-            "most_shear_mpa": round(float(np.hypot(*traction[:, :2].T).max()), 5),
+            "max_pressure_mpa": round(float(-traction[:, 2].min()), 5),
+            "max_shear_mpa": round(float(np.hypot(*traction[:, :2].T).max()), 5),
             "utilisation": round(contact.utilisation, 3) if np.isfinite(contact.utilisation) else None,
             "regions": [region.centre_mm.round(3).tolist() for region in contact.regions],
         }
