@@ -270,7 +270,12 @@ def frame_message(frame: Any, frames_per_s: float, age_ms: float = 0.0, image: b
     quality = None if in_space else frame.markers.quality
     largest_mm = np.linalg.norm(frame.shape.displacement_mm if in_space else frame.displacement_mm, axis=1)
     contact = frame.contact if in_space else None
-    columns = {"ids": found, "status": status[found], "place": place[found], "moved": np.nan_to_num(moved[found])}
+    columns = {
+        "ids": found,
+        "status": status[found],
+        "place": place[found],
+        "moved": np.nan_to_num(moved[found]),
+    }
     if contact is not None and np.isfinite(contact.force_n).all():
         traction = np.nan_to_num(contact.marker_traction_mpa[found])
         columns |= {"shear_mpa": traction[:, :2], "pressure_mpa": -traction[:, 2]}
