@@ -76,11 +76,8 @@ def measure(quick: bool = False) -> Shown:
 
 def page(results: dict[str, Any]) -> Page:
     """The table of docs/how-to/studio.md."""
-    head = ["source", "source's frames/s", "shown frames/s", "server, ms a frame", "browser, ms a frame"]
-    keys = ["frames/s", "shown/s", "server ms", "browser ms"]
-    rows = [[row["source"], *(f"{row[key]:.0f}" for key in keys)] for row in results["shown"]]
-    lines = [head, ["---"] * len(head), *rows]
-    return Page({"studio": "\n".join(f"| {' | '.join(line)} |" for line in lines)})
+    rows = [tuple(row.values()) for row in results["shown"]]
+    return Page({"studio": Table("frames on the page", SHOWN, rows).markdown()})
 
 
 main = Experiment("studio", measure, page)

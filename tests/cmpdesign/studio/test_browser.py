@@ -22,7 +22,7 @@ import cmpdesign
 from benchmarks.studio.page import browser, chromium, options, served
 from benchmarks.studio.sensor import write_touched_sensor
 from cmpdesign.products.drawing.svg import layout_to_svg
-from tests.support.live_messages import unpacked
+from tests.support.tracking.live_messages import unpacked
 
 pytestmark = [
     pytest.mark.slow,

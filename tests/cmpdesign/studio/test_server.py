@@ -34,7 +34,7 @@ from cmpdesign.studio.guard import Door
 from cmpdesign.studio.live import LiveFeed
 from cmpdesign.studio.serving import serve
 from tests.support.laser_tools import coupon_photo
-from tests.support.live_messages import unpacked
+from tests.support.tracking.live_messages import unpacked
 
 DOOR = Door("127.0.0.1", 8300, "the-token-of-this-run")
 HOME, SOCKETS = "http://127.0.0.1:8300", "ws://127.0.0.1:8300"
