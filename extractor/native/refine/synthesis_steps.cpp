@@ -1,5 +1,6 @@
 #include "refine/synthesis_steps.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "refine/synthesis/residual_kernel.hpp"
@@ -27,8 +28,12 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
       sums, gradients, contrasts, state.xy, topology, static_cast<double>(view.image.size(1)),
       static_cast<double>(view.image.size(0)), limits.dot_gain);
   Array<double, 1> dot_gain_offset = dot_gain_offsets(sums, contrasts, edge_cells, dot_gain);
-  Array<double, 2> ink_shift = measure_ink_shift(sums, gradients, lines, state.ink_shift, state.maps, sigma,
-                                                 topology, limits.ink_shift);
+  // the round of profiles tells whether inks lie off
+  const auto drawn = state.ink_shift.flat();
+  const bool is_shifted = std::any_of(drawn.begin(), drawn.end(), [](double value) { return value != 0.0; });
+  Array<double, 2> ink_shift = is_shifted ? measure_ink_shift(sums, gradients, lines, state.ink_shift,
+                                                              state.maps, sigma, topology, limits.ink_shift)
+                                          : Array<double, 2>(state.ink_shift);
   update_without_offsets(sums, gradients, dot_gain_offset);
   update_without_ink_shift(sums, gradients, lines, state.ink_shift, ink_shift, state.maps, topology);
   EliminatedBending bent = update_for_bending(
