@@ -145,6 +145,7 @@ class Reconstructor:
 
     Raises:
         PoseError: fewer than two views, a view whose pose cannot be estimated, or views that give no depth.
+        RigError: the rig was calibrated with another pad.
     """
 
     def __init__(
@@ -161,6 +162,7 @@ class Reconstructor:
         if len(rig.views) < 2:
             raise PoseError(f"the rig has {len(rig.views)} view; depth needs two or more")
         self.layout = layout = layout_of(layout)
+        rig.require_layout(layout)
         self.rig = rig
         self.field = Field(layout)
         edge_mm = np.linalg.norm(np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0], axis=1)

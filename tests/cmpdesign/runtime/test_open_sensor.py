@@ -328,6 +328,9 @@ WRONG = {
     ("thumb.toml", "other.toml"): "camera '0' is used by",
     ("none.toml",): r"\[camera\] names no source",
     ("two.toml",): "names 2 cameras for 1",
+    (
+        "old.toml",
+    ): r"old.toml: \[calibration.rig\] was made with the layout 123456789abc, .* repeat cmpdesign calibrate rig",
 }
 
 
@@ -336,6 +339,9 @@ def test_files_that_cannot_be_used(names: tuple[str, ...], folder: Path) -> None
     write_sensor(folder / "other.toml", 0, FPS)
     write_sensor(folder / "none.toml", "", FPS)
     write_sensor(folder / "two.toml", "0,1", FPS)
+    write_sensor(folder / "old.toml", 0, FPS)
+    with (folder / "old.toml").open("a", encoding="utf-8") as file:
+        file.write('[calibration.rig]\nlayout_digest = "123456789abcdef"\n')
     with pytest.raises(SensorError, match=WRONG[names]):
         cmpdesign.open_sensor(*(folder / name for name in names))
     with pytest.raises(SensorError, match="shape needs two or more"):
