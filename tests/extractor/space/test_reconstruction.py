@@ -325,9 +325,9 @@ def test_mistakes_are_refused_by_name() -> None:
     ):
         with pytest.raises(PoseError, match=said):
             Reconstructor(LAYOUT, rig, seen)
-    made = replace(LAYOUT, digest="2" * 64, as_made=cast(Any, SimpleNamespace(of=LAYOUT.digest)))
-    for pad, rig in ((LAYOUT, Rig(views)), (made, Rig(views, layout_digest=LAYOUT.digest))):
-        Reconstructor(pad, rig, rest)
+    as_made = SimpleNamespace(of=LAYOUT.digest, outlines_mm=None, covariance_mm2=None, cell_height_mm=0.0)
+    made = replace(LAYOUT, digest="2" * 64, as_made=cast(Any, as_made))
+    Rig(views, layout_digest=LAYOUT.digest).require_layout(made)
     with pytest.raises(
         RigError, match=r"made with the layout 222222222222, .* repeat cmpdesign calibrate rig"
     ):
