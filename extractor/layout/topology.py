@@ -102,10 +102,8 @@ def topology_of(layout: Reference) -> Topology:
     edge_vectors = chord / length.mean()
     # from one side, scatter makes more second derivatives than bending does: the rim's count as 0, and what is left
     # out may be as large as what scatter would make
-    slopes, all_slopes = (
-        slope_weights(stencil, ring_markers, edges, edge_vectors, is_curved)
-        for is_curved in (np.all(spokes >= 0, axis=1), np.ones(len(spokes), np.bool_))
-    )
+    all_slopes = slope_weights(stencil, ring_markers, edges, edge_vectors)
+    slopes = all_slopes.curved_at(edges, np.all(spokes >= 0, axis=1))
     couplings = end_couplings(slopes, edges)
     is_inner: NDArray[np.bool_] = np.all(ring_markers >= 0, axis=1)
     is_seen: NDArray[np.bool_] = np.any(edge_cells >= 0, axis=1)

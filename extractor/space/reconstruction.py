@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,7 +213,7 @@ class Reconstructor:
         status = np.where(points.reason == PointReason.NONE, status, Status.LOST).astype(np.uint8)
         cov_mm2 = points.cov_mm2 + _propagate_covariance(points.by_pose, self.poses.cov)
 
-        def surface() -> tuple[Array, ...]:
+        def surface() -> tuple[NDArray[Any], ...]:
             slopes = self.field.gradients(points.xyz_mm)
             normals = normals_of(slopes)
             found = self._virtual(SurfaceMarkers(points.xyz_mm, cov_mm2, slopes, normals))

@@ -16,8 +16,8 @@ bool is_finite(View<const double, 1> values) {
   return true;
 }
 
-// The shares of start, end, slope at the start and slope at the end in the cubic at a fraction, and their share
-// without the slopes.
+// The shares of start, end, slope at the start and slope at the end in the cubic at a fraction, and their
+// share without the slopes.
 struct CubicShares {
   double start, end, leave, arrive;
 
@@ -86,10 +86,9 @@ Array<double, 3> gradients(View<const double, 3> weights, View<const std::int64_
 SurfacePoints points_on_edges(const SurfaceMarkers& markers, View<const std::int32_t, 2> edges,
                               View<const double, 2> steps_mm, std::int64_t count) {
   const Index number = edges.size(), each = static_cast<Index>(count);
-  SurfacePoints out{Array<double, 3>({number, each, 3}, NOT_A_NUMBER),
-                    Array<double, 4>({number, each, 3, 3}, NOT_A_NUMBER),
-                    Array<double, 3>({number, each, 3}, NOT_A_NUMBER),
-                    Array<std::uint8_t, 2>({number, each}, LOST)};
+  SurfacePoints out{
+      Array<double, 3>({number, each, 3}, NOT_A_NUMBER), Array<double, 4>({number, each, 3, 3}, NOT_A_NUMBER),
+      Array<double, 3>({number, each, 3}, NOT_A_NUMBER), Array<std::uint8_t, 2>({number, each}, LOST)};
   for (Index e = 0; e < number; ++e) {
     if (!is_finite(markers.xyz_mm[edges(e, 0)]) || !is_finite(markers.xyz_mm[edges(e, 1)])) continue;
     const Ends ends(markers, edges[e], steps_mm[e]);

@@ -7,8 +7,8 @@ namespace cmp::space {
 
 // The derivatives of values at M markers by the layout's x and y, (M, k, 2); NaN at unknown markers.
 //
-// weights (M, 2, K): of the differences to the K markers around each, NaN where these are too few. around (M, K):
-// their ids, -1 for none. values (M, k): NaN where unknown.
+// weights (M, 2, K): of the differences to the K markers around each, NaN where these are too few. around (M,
+// K): their ids, -1 for none. values (M, k): NaN where unknown.
 Array<double, 3> gradients(View<const double, 3> weights, View<const std::int64_t, 2> around,
                            View<const double, 2> values);
 
@@ -32,9 +32,9 @@ struct SurfacePoints {
   CMP_RECORD("extractor.space.reconstruction.SurfacePoints", xyz_mm, cov_mm2, normals, status)
 };
 
-// The places are on the cubic with the surface's slopes at both ends, which is an edge of the element of Clough
-// and Tocher, or with the chord where a slope is unknown. The covariances are those of the ends; the normals lie
-// between theirs.
+// The places are on the cubic with the surface's slopes at both ends, which is an edge of the element of
+// Clough and Tocher, or with the chord where a slope is unknown. The covariances are those of the ends; the
+// normals lie between theirs.
 //
 // edges (E, 2) marker ids. steps_mm (E, 2): from start to end in the layout. count: m.
 SurfacePoints points_on_edges(const SurfaceMarkers& markers, View<const std::int32_t, 2> edges,
