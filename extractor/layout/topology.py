@@ -223,23 +223,23 @@ def _derivative_stencil(
     every = known.astype(np.float64)
     fits = (quadratic, near, ridge, first), (cubic, even, 0.0, first), (quadratic, every, ridge, second)
     for terms, weight, added, rows in fits:
-        solutions, regular = _least_squares(terms[enough], weight[enough], added)
-        out[enough[regular], rows] = solutions[regular, rows]
+        solutions, regular = _least_squares(terms[enough], weight[enough], added, rows)
+        out[enough[regular], rows] = solutions
     return out
 
 
 def _least_squares(
-    terms: NDArray[np.float64], weight: NDArray[np.float64], ridge: NDArray[np.float64] | float
+    terms: NDArray[np.float64], weight: NDArray[np.float64], ridge: NDArray[np.float64] | float, rows: slice
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(n, T, K) the weights that give T coefficients from K values, and (n,) whether the values determine them.
+    """(r, R, K) the weights that give R coefficients from K values; (n,) whether the values determine all, r times.
 
     Args:
         terms: (n, K, T). weight: (n, K), of the values. ridge: (T,), added to the diagonal of the normal equations.
+        rows: the R coefficients of the T.
     """
     weighted = np.swapaxes(terms * weight[..., None], 1, 2)
     gram = weighted @ terms + ridge * np.eye(terms.shape[2])
     eigenvalues = np.linalg.eigvalsh(gram)
     regular = eigenvalues[:, -1] < MAX_CONDITION * eigenvalues[:, 0]
-    solutions = np.zeros(weighted.shape)
-    solutions[regular] = np.linalg.solve(gram[regular], weighted[regular])
-    return solutions, regular
+    by_row = np.linalg.solve(gram[regular], np.eye(terms.shape[2])[:, rows])
+    return np.swapaxes(by_row, 1, 2) @ weighted[regular], regular
