@@ -22,7 +22,7 @@ GATE_SIGMAS = 6.0  # misfit above which a point is not reported; chosen
 TOLERANCE_PX = 0.1  # error beyond the covariance where gridlines bend more than extraction can follow; chosen
 MIN_EIGENVALUE = 1e-13  # of an information matrix with a unit diagonal, for an inverse
 INFLATION_SIGMAS = 3.0  # misfit above which a point's covariance is inflated; chosen
-MOST_VIEWS = 8  # as in native/space/triangulation.hpp
+MAX_VIEWS = 8  # as in native/space/triangulation.hpp
 
 
 class TriangulationLimits(NamedTuple):
@@ -110,8 +110,8 @@ def triangulate(
         gate_sigmas: misfit above which a point is ``DISAGREE``,
         tolerance_px: if the norm of its residuals over all views is also above this.
     """
-    if len(views) > MOST_VIEWS:
-        raise ValueError(f"{len(views)} views; at most {MOST_VIEWS} are triangulated")
+    if len(views) > MAX_VIEWS:
+        raise ValueError(f"{len(views)} views; at most {MAX_VIEWS} are triangulated")
     cov_pose = np.zeros((6 * len(views), 6 * len(views))) if cov_pose is None else cov_pose
     found = native.triangulate(
         tuple(view.native for view in views),

@@ -10,7 +10,7 @@ template <>
 struct FromPython<space::PlacedViews> {
   static space::PlacedViews get(nb::handle object, const Name& name, Borrowed& borrowed) {
     const std::size_t count = nb::len(object);
-    if (count > space::MOST_VIEWS) throw nb::type_error((name.text() + " has more than 8 views").c_str());
+    if (count > space::MAX_VIEWS) throw nb::type_error((name.text() + " has more than 8 views").c_str());
     space::PlacedViews out{static_cast<int>(count), {}};
     for (std::size_t k = 0; k < count; ++k)
       out.views[k] = space::PlacedView::read(Fields(object[k], name, borrowed));

@@ -94,8 +94,8 @@ inline Matrix<3, 3> cross_matrix(const Vector<3>& v) {
 
 // The eigenvalues of a symmetric matrix by Jacobi's rotations, the least one first.
 inline std::array<double, 3> eigenvalues(Matrix<3, 3> m) {
-  constexpr int MOST_SWEEPS = 30;
-  for (int sweep = 0; sweep < MOST_SWEEPS; ++sweep) {
+  constexpr int MAX_SWEEPS = 30;
+  for (int sweep = 0; sweep < MAX_SWEEPS; ++sweep) {
     const double beside = std::abs(m(0, 1)) + std::abs(m(0, 2)) + std::abs(m(1, 2));
     if (!(beside > 0.0)) break;
     for (const auto [p, q] : {std::array{0, 1}, std::array{0, 2}, std::array{1, 2}}) {

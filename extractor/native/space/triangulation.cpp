@@ -21,13 +21,13 @@ struct Seen {
 // The pixels of a point.
 struct Pixels {
   int count = 0;
-  std::array<Seen, MOST_VIEWS> seen;
+  std::array<Seen, MAX_VIEWS> seen;
 };
 
 // Residuals of a point and their derivatives in every view that shows it.
 struct Residuals {
-  std::array<Vector<2>, MOST_VIEWS> px;
-  std::array<Picture, MOST_VIEWS> pictures;
+  std::array<Vector<2>, MAX_VIEWS> px;
+  std::array<Picture, MAX_VIEWS> pictures;
   double chi_square = 0.0;
 };
 
@@ -61,7 +61,7 @@ void add_pixel(Pixels& pixels, const PlacedView& view, int number, View<const do
 // Where the rays meet behind a camera or before its window, the point is that of its ray on the layout's
 // plane.
 std::uint8_t find_start(const Pixels& pixels, const TriangulationLimits& limits, Vector<3>& start) {
-  std::array<Ray, MOST_VIEWS> rays;
+  std::array<Ray, MAX_VIEWS> rays;
   Matrix<3, 3> normal;
   Vector<3> right;
   for (std::size_t k = 0; k < static_cast<std::size_t>(pixels.count); ++k) {
@@ -156,7 +156,7 @@ double freedom(const Pixels& pixels, const Solution& found, View<const double, 2
   for (std::size_t k = 0; k < static_cast<std::size_t>(pixels.count); ++k) {
     const Seen& seen = pixels.seen[k];
     const Picture& shown = found.residuals.pictures[k];
-    std::array<std::array<double, 6 * MOST_VIEWS>, 2> moved{}, spread{};
+    std::array<std::array<double, 6 * MAX_VIEWS>, 2> moved{}, spread{};
     for (Index j = 0; j < size; ++j)
       for (int i = 0; i < 2; ++i) {
         double value = 0.0;

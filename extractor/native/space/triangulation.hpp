@@ -7,7 +7,7 @@
 
 namespace cmp::space {
 
-inline constexpr int MOST_VIEWS = 8;
+inline constexpr int MAX_VIEWS = 8;
 
 // Explained in extractor/space/triangulation.py.
 struct TriangulationLimits {
@@ -34,7 +34,7 @@ struct Gate {
 // The views of a rig.
 struct PlacedViews {
   int count;
-  std::array<PlacedView, MOST_VIEWS> views;
+  std::array<PlacedView, MAX_VIEWS> views;
 };
 
 // xyz_mm, cov_mm2, by_pose, misfit and reason of Points.
