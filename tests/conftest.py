@@ -10,13 +10,12 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
-import typer.testing
 from typer.main import get_command
 
 from tests.support.layouts import small_text
 
 # Typer makes all commands anew for every call, which takes longer than most calls.
-typer.testing._get_command = cache(get_command)
+pytest.MonkeyPatch().setattr("typer.testing._get_command", cache(get_command))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
