@@ -49,7 +49,7 @@ def build(
         OutputError: a file cannot be written.
     """
     from cmpdesign.api.designs import checked_camera
-    from cmpdesign.documents.designs import BuildDocument, finding_parts, reading_parts
+    from cmpdesign.documents.designs import BuildDocument
     from cmpdesign.layout.report import report_values
     from cmpdesign.products.building import build_files
 
@@ -63,8 +63,7 @@ def build(
         written=tuple(map(str, built.written)),
         removed=tuple(map(str, built.removed)),
         report={name: value for name, value in report_values(built.report).items() if name != "findings"},
-        as_made=reading_parts(built.readings),
-        findings=finding_parts(built.findings),
+        as_made={name: reading.figures() for name, reading in built.readings.items()},
     )
 
 
@@ -86,7 +85,7 @@ def check(
         read: draw and read the pads that laser, mold and print would make.
     """
     from cmpdesign.api.designs import checked_camera
-    from cmpdesign.documents.designs import CheckDocument, finding_parts, reading_parts
+    from cmpdesign.documents.designs import CheckDocument
     from cmpdesign.products.building import check_products
 
     chosen = _design(design, overrides)
@@ -95,9 +94,8 @@ def check(
         checked,
         digest=chosen.layout.digest,
         passed=checked.works,
-        as_made=reading_parts(checked.readings),
-        not_read=dict(checked.unread),
-        findings=finding_parts(checked.findings),
+        as_made={name: reading.figures() for name, reading in checked.readings.items()},
+        not_read=checked.unread,
     )
 
 
