@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
-MOST_ON_WINDOWS = 61
+MAX_ON_WINDOWS = 61
 
 
 @contextmanager
@@ -52,7 +52,7 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 def possible_workers(workers: int) -> int:
     """The number of processes, or the most that Python can wait for on Windows."""
-    return min(workers, MOST_ON_WINDOWS) if sys.platform == "win32" else workers
+    return min(workers, MAX_ON_WINDOWS) if sys.platform == "win32" else workers
 
 
 def _begin() -> None:

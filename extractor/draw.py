@@ -126,7 +126,7 @@ def _enlarged(base: Picture, scale: int, brightness: float) -> Picture:
 
 
 def _picture_coordinates(xy_px: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
-    """Image coordinates (pixel centers at integers) in the enlarged picture."""
+    """Image coordinates (pixel centres at integers) in the enlarged picture."""
     return (xy_px + 0.5) * scale - 0.5
 
 
@@ -134,8 +134,8 @@ def _draw_dot(
     canvas: Picture, x: float, y: float, radius: float, color: tuple[int, int, int], thickness: int = -1
 ) -> None:
     unit = 1 << SHIFT
-    center = round(x * unit), round(y * unit)
-    cv2.circle(canvas, center, round(radius * unit), color, thickness, cv2.LINE_AA, SHIFT)
+    centre = round(x * unit), round(y * unit)
+    cv2.circle(canvas, centre, round(radius * unit), color, thickness, cv2.LINE_AA, SHIFT)
 
 
 def _draw_lines(
@@ -237,13 +237,13 @@ def _draw_cells(base: Picture, scale: int, cells: Cells) -> Picture:
 
 
 def _draw_mesh(base: Picture, scale: int, cells: Cells, mesh: CellMesh) -> Picture:
-    """The links between the centers of cells; cells without a link are gray dots."""
+    """The links between the centres of cells; cells without a link are gray dots."""
     canvas = _enlarged(base, scale, 0.4)
-    centers = _picture_coordinates(cells.center_px, scale)
+    centres = _picture_coordinates(cells.centre_px, scale)
     one, step = np.nonzero(mesh.links.neighbours >= 0)
     other = mesh.links.neighbours[one, step]
-    _draw_lines(canvas, np.stack([centers[one], centers[other]], axis=1), STATUS_BGR[Status.MEASURED])
-    for (x, y), is_linked in zip(centers, mesh.is_linked, strict=True):
+    _draw_lines(canvas, np.stack([centres[one], centres[other]], axis=1), STATUS_BGR[Status.MEASURED])
+    for (x, y), is_linked in zip(centres, mesh.is_linked, strict=True):
         _draw_dot(canvas, x, y, 4.0, WHITE_BGR if is_linked else GRAY_BGR)
     return canvas
 

@@ -24,14 +24,14 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.atomic import write_folder
 from cmpdesign.files.image_header import open_header
 from cmpdesign.files.images import ImageFileError, decode_bytes
-from cmpdesign.inputs.files import MOST_TEXT_BYTES, open_file, require_size
+from cmpdesign.inputs.files import MAX_TEXT_BYTES, open_file, require_size
 from cmpdesign.reading.problem_report import ReportDocument, parse_report
 from extractor import ExtractorError, parse_layout
 
 ROOT = Path(__file__).resolve().parents[1]
 CASES = ROOT / "tests" / "extractor" / "reported" / "cases"
-MOST_BYTES = 1 << 28  # 256 MiB: of a report, and of its files together
-MOST_MEMBERS = 1000
+MAX_BYTES = 1 << 28  # 256 MiB: of a report, and of its files together
+MAX_MEMBERS = 1000
 NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]{0,59}")
 # What zipfile raises on a damaged, encrypted or unknown member.
 ZIP_ERRORS = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
@@ -60,7 +60,7 @@ def adopt(report: Path, name: str | None = None, cases: Path = CASES) -> Path:
         raise ReportError(f"{folder} exists already; give another --name")
     try:
         with open_file(report) as file:
-            require_size(file, report, MOST_BYTES)
+            require_size(file, report, MAX_BYTES)
             with zipfile.ZipFile(file) as bundle:
                 contents = _checked_contents(_Members(bundle))
         write_folder(folder, contents)
@@ -73,10 +73,10 @@ class _Members:
     """The files of a bundle, read up to a common limit of bytes: the sizes that the bundle states are not believed."""
 
     def __init__(self, bundle: zipfile.ZipFile) -> None:
-        self._bundle, self._left = bundle, MOST_BYTES
+        self._bundle, self._left = bundle, MAX_BYTES
         names = bundle.namelist()
-        if len(names) > MOST_MEMBERS or len(set(names)) < len(names):
-            raise ReportError(f"holds more than {MOST_MEMBERS} files, or two files of one name")
+        if len(names) > MAX_MEMBERS or len(set(names)) < len(names):
+            raise ReportError(f"holds more than {MAX_MEMBERS} files, or two files of one name")
 
     def read(self, name: str, most_bytes: int = 1 << 62) -> bytes:
         """The content of a file; raises ``ReportError`` without such a file, or beyond a limit."""
@@ -86,14 +86,14 @@ class _Members:
         with self._bundle.open(name) as file:
             data = file.read(most + 1)
         if len(data) > most:
-            raise ReportError(f"{name} unpacks to more than {min(MOST_BYTES, most_bytes) >> 20} MiB")
+            raise ReportError(f"{name} unpacks to more than {min(MAX_BYTES, most_bytes) >> 20} MiB")
         self._left -= len(data)
         return data
 
 
 def _checked_contents(members: _Members) -> dict[str, bytes]:
     """The files of the case by their new names."""
-    report = parse_report(members.read("report.json", MOST_TEXT_BYTES).decode("utf-8"), "report.json")
+    report = parse_report(members.read("report.json", MAX_TEXT_BYTES).decode("utf-8"), "report.json")
     layout = members.read("layout.json")
     parse_layout(layout.decode("utf-8"), "layout.json")
     pictures = dict(_new_pictures(members, report))

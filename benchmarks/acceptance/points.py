@@ -11,8 +11,8 @@ from benchmarks.suites.ablation.trial import PictureScore
 
 CONFIDENCE = 0.95
 MILLION = 1e6
-MOST_WRONG = 10.0  # per million reported markers, that the upper bound may be
-MOST_LOST = 1.05  # times as many as at the reader's own threshold
+MAX_WRONG = 10.0  # per million reported markers, that the upper bound may be
+MAX_LOST = 1.05  # times as many as at the reader's own threshold
 
 
 def upper_share(wrong: int, count: int) -> float:
@@ -51,8 +51,8 @@ class Point(NamedTuple):
 
     def holds(self, own: Point) -> bool:
         """No wrong id, the upper bound of wrong positions kept, and hardly more lost than at the own threshold."""
-        is_right = self.wrong_ids == 0 and self.upper_per_million <= MOST_WRONG
-        return is_right and self.lost <= MOST_LOST * own.lost
+        is_right = self.wrong_ids == 0 and self.upper_per_million <= MAX_WRONG
+        return is_right and self.lost <= MAX_LOST * own.lost
 
 
 def pooled_point(threshold: float, scores: Sequence[PictureScore]) -> Point:

@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from benchmarks.acceptance.points import MOST_LOST, MOST_WRONG, Point
+from benchmarks.acceptance.points import MAX_LOST, MAX_WRONG, Point
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
 
@@ -70,10 +70,10 @@ def curve_picture(measured: Mapping[str, Any]) -> bytes:
     above = [one.upper_per_million - one.wrong_per_million for one in points]
     figure, (wrong, lost) = pyplot.subplots(2, 1, sharex=True, figsize=(7.2, 4.4))
     wrong.errorbar(at, share, yerr=[[0.0] * len(above), above], fmt="o", color=BLUE, capsize=4, markersize=5)
-    wrong.axhline(MOST_WRONG, color=GREY, linestyle="--", linewidth=1)
-    wrong.set(ylabel="wrong a million,\n95 % below", ylim=(0, 1.2 * MOST_WRONG))
+    wrong.axhline(MAX_WRONG, color=GREY, linestyle="--", linewidth=1)
+    wrong.set(ylabel="wrong a million,\n95 % below", ylim=(0, 1.2 * MAX_WRONG))
     lost.plot(at, [one.lost / own.lost for one in points], "o-", color=BLUE, markersize=5)
-    lost.axhline(MOST_LOST, color=GREY, linestyle="--", linewidth=1)
+    lost.axhline(MAX_LOST, color=GREY, linestyle="--", linewidth=1)
     lost.set(
         xscale="log", xlabel="threshold, edges; the reader's own is dotted", ylabel="lost,\nover today's"
     )

@@ -22,7 +22,7 @@ from benchmarks.suites.camera.shoot import CameraPicture, shoot
 from benchmarks.suites.scoring.calibration import summarise
 
 IMAGE = "camera-failures.jpg"
-LEAST_MEASURED, MOST_RMS_PITCHES, MOST_Z = 0.95, 0.05, 5.0  # beyond these a picture fails
+MIN_MEASURED, MAX_RMS_PITCHES, MAX_Z = 0.95, 0.05, 5.0  # beyond these a picture fails
 LOST_BGR, WRONG_BGR = (0, 220, 255), (60, 60, 255)
 
 
@@ -31,9 +31,9 @@ def fails(result: PictureResult) -> bool:
     return (
         result.raised
         or result.wrong_ids + result.wrong_places > 0
-        or result.measured_share < LEAST_MEASURED
-        or result.rms_px > MOST_RMS_PITCHES * result.pitch_px
-        or picture_z(result) > MOST_Z
+        or result.measured_share < MIN_MEASURED
+        or result.rms_px > MAX_RMS_PITCHES * result.pitch_px
+        or picture_z(result) > MAX_Z
     )
 
 

@@ -16,10 +16,10 @@ from benchmarks.suites.camera.reading import LOST, UNSEEN, PictureResult
 from benchmarks.suites.scoring.calibration import summarise
 
 TOGETHER = "together"
-LEAST_CONTRAST, LEAST_PITCH_PX = 20.0, 8.0  # from which on neighbouring cells are separable
+MIN_CONTRAST, MIN_PITCH_PX = 20.0, 8.0  # from which on neighbouring cells are separable
 COLORS_SEPARABLE, ALL_SEPARABLE = "colors, CIE76 20", "together, CIE76 20"
 NO_REASON = "no reason given"
-MOST_FAILURES = 40  # listed pictures
+MAX_FAILURES = 40  # listed pictures
 Row = tuple[Any, ...]  # of COLUMNS
 COLUMNS = {
     "effect": TEXT, "pictures": "d", "unread": "d", "raised": "d", "visible": "d", "measured": ".1%", "ids": "d",
@@ -62,7 +62,7 @@ def effect_row(effect: str, results: Sequence[PictureResult]) -> Row:
 
 def is_separable(result: PictureResult) -> bool:
     """Neighbouring cells differ by a CIE76 of 20 (5th percentile over the pattern), and the pitch is 8 px or more."""
-    return result.contrast >= LEAST_CONTRAST and result.pitch_px >= LEAST_PITCH_PX
+    return result.contrast >= MIN_CONTRAST and result.pitch_px >= MIN_PITCH_PX
 
 
 def separable_rows(results: Sequence[PictureResult]) -> list[Row]:
@@ -91,6 +91,6 @@ def failure_lines(results: Iterable[PictureResult]) -> list[str]:
         f"RAISED   {result.case.name}  {result.reason}"
         if result.raised
         else f"WRONG    {result.wrong_ids:>4} ids {result.wrong_places:>4} positions  {result.case.name}"
-        for result in failed[:MOST_FAILURES]
+        for result in failed[:MAX_FAILURES]
     ]
-    return [*lines, f"and {len(failed) - MOST_FAILURES} more"] if len(failed) > MOST_FAILURES else lines
+    return [*lines, f"and {len(failed) - MAX_FAILURES} more"] if len(failed) > MAX_FAILURES else lines

@@ -25,10 +25,8 @@ from cmpdesign.design.design import load_design
 from extractor import ContactForce, ContactReader
 
 Array = NDArray[np.float64]
-LEAST_N = 0.3  # of the summary's frames
-LEAST_SHEAR = (
-    0.1  # of the press, above which a frame has a shear and can have an error as a share of the shear
-)
+MIN_N = 0.3  # of the summary's frames
+MIN_SHEAR = 0.1  # of the press, above which a frame has a shear and can have an error as a share of the shear
 FLAT = ("twist", "punch", "ring")  # their touched area is not that of a ball
 COLUMNS = {
     "contact": TEXT, "Fz, N": ".3f", "shear / Fz": ".2f", "Fz error": "+.1%", "z": "+.1f", "shear": ".1%",
@@ -89,7 +87,7 @@ def errors_of(found: ContactForce, frame: dict[str, Array], name: str, times_ms:
         normal=-float(error[2]) / press,
         normal_z=float(error[2] / sigma[2]),
         shear=shear_error_n / press,
-        of_shear=shear_error_n / shear_n if shear_n > LEAST_SHEAR * press else np.nan,
+        of_shear=shear_error_n / shear_n if shear_n > MIN_SHEAR * press else np.nan,
         shear_z=error[:2] / sigma[:2],
         torque=float(np.linalg.norm(torque)) / size,
         torque_z=torque / torque_sigma,
@@ -150,7 +148,7 @@ def summary(found: list[Errors]) -> Table:
                 worst = float(np.abs(values).max())
                 rows.append((half, quantity, len(values), _rms(values), worst, _rms(z) if len(z) else None))
     columns = {"frames": TEXT, "error of": TEXT, "number": "d", "rms": ".4f", "worst": ".4f", "z": ".2f"}
-    return Table(f"frames above {LEAST_N} N", columns, rows)
+    return Table(f"frames above {MIN_N} N", columns, rows)
 
 
 def _known(values: Iterable[float | Array]) -> Array:
@@ -193,7 +191,7 @@ def measure(
                 found += read_case(case, frames, random, one_view, depth_mm, lost)
         if turn == 0:
             yield Table("frames", COLUMNS, [row_of(one) for one in found])
-    yield summary([one for one in found if one.press_n > LEAST_N])
+    yield summary([one for one in found if one.press_n > MIN_N])
     times_ms = np.array([one.times_ms for one in found]).reshape(noises, -1, 2).min(axis=0)
     cold_ms, warm_ms = np.median(times_ms, axis=0)
     still = seen_from(reader_of(4.0, 0.5, depth_mm), one_view)

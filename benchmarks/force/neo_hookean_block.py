@@ -21,8 +21,8 @@ from benchmarks.force.objects import RigidObject
 Array = NDArray[np.float64]
 PENALTY_PER_MODULUS, STICK_PER_MODULUS = 40.0, 10.0  # of the modulus E, 1/mm
 RAMP_MM = 0.004  # of penetration, over which the penalty grows to its full stiffness
-TOLERANCE_MM, LARGEST_STEP_MM, MOST_STEPS = 1e-3, 0.2, 25
-LEAST_LIMIT = 1e-5  # of the modulus, where nothing has pressed before
+TOLERANCE_MM, LARGEST_STEP_MM, MAX_STEPS = 1e-3, 0.2, 25
+MIN_LIMIT = 1e-5  # of the modulus, where nothing has pressed before
 
 try:  # a tenth of the time of SciPy's solver
     import pypardiso
@@ -148,7 +148,7 @@ class NeoHookeanBlock:
     def _advance(self, pose: Pose) -> bool:
         u, p = self.u.copy(), self.p.copy()
         before = np.inf
-        for iteration in range(MOST_STEPS):
+        for iteration in range(MAX_STEPS):
             contact = self._contact(u, pose) if iteration else self._expected(pose)
             du, dp = self._newton(u, p, contact)
             largest = np.abs(du).max()
@@ -212,7 +212,7 @@ class NeoHookeanBlock:
         # both keep Newton's method convergent, and the tractions are in equilibrium with the block all the same.
         limit = (
             self.friction * (self.last.pressure if self.last is not None else pressure)
-            + LEAST_LIMIT * self.young
+            + MIN_LIMIT * self.young
         )
         root = np.sqrt(limit**2 + (trial**2).sum(axis=1))
         ratio = np.where(touching, limit / root, 0.0)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CloughTocher2DInterpolator
 
-from benchmarks.force.__main__ import COLUMNS, LEAST_N, Errors, errors_of, reader_of, row_of, summary
+from benchmarks.force.__main__ import COLUMNS, MIN_N, Errors, errors_of, reader_of, row_of, summary
 from benchmarks.force.truth import DEPTHS_MM, TRUTH, Case, cases
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import Table
@@ -110,7 +110,7 @@ def measure(only: tuple[str, ...] = (), seed: int = 1) -> Shown:
             frames = [{key: values[k] for key, values in truth.items()} for k in mine]
             found += read_frames(case, frames, 1000 * seed + len(found))
     yield Table("frames", COLUMNS, [row_of(one) for one in found])
-    yield summary([one for one in found if one.press_n > LEAST_N])
+    yield summary([one for one in found if one.press_n > MIN_N])
 
 
 main = Experiment("force.pictures", measure)

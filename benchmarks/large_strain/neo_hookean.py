@@ -18,7 +18,7 @@ LAYER = Elastomer(4.0, 0.3, 0.5, 1.0)
 RADIUS_MM, FAR_MM = 10.0, 24.0
 # Penetration under a pressure of one shear modulus: 0.4 um.
 PENALTY_PER_MODULUS = 2500.0
-NEWTON_TOLERANCE_MM, LARGEST_NEWTON_STEP_MM, MOST_NEWTON_STEPS = 1e-5, 0.15, 60
+NEWTON_TOLERANCE_MM, LARGEST_NEWTON_STEP_MM, MAX_NEWTON_STEPS = 1e-5, 0.15, 60
 PRESS_STEP_MM = 0.1
 NEAR_MM = np.linspace(0, 9, 28)  # nodes from the axis
 
@@ -136,7 +136,7 @@ class NeoHookeanLayer:
         mu, n = self.elastomer.shear_mpa, self.basis.N
         contact = {"press": press_mm, "penalty": self.penalty, "radius": self.radius_mm}
         r = np.asarray(self.basis.global_coordinates())[0]
-        for _ in range(MOST_NEWTON_STEPS):
+        for _ in range(MAX_NEWTON_STEPS):
             f = _gradient(self.basis.interpolate(at[:n]), r) + np.eye(3)[:, :, None, None]
             g, j = _cofactor(f)
             state = {"f": f, "g": g, "j": j, "p": np.asarray(self.pressures.interpolate(at[n:])), "mu": mu}

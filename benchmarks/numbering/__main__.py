@@ -87,13 +87,13 @@ class CellCount:
     wrong: int = 0
 
     def add(
-        self, cell: NDArray[np.int32], center_px: NDArray[np.float64], reference: Reference, truth: Truth
+        self, cell: NDArray[np.int32], centre_px: NDArray[np.float64], reference: Reference, truth: Truth
     ) -> None:
         """Count the numbered cells: each belongs to the layout's cell with the nearest true centre."""
         inked = np.flatnonzero(reference.cell_color < 3)
         true_px = truth.marker_xy_px[reference.cell_corners[inked]].mean(axis=1)
         self.visible += int(truth.cell_visible[inked].sum())
-        for found, centre in zip(cell[cell >= 0], center_px[cell >= 0], strict=True):
+        for found, centre in zip(cell[cell >= 0], centre_px[cell >= 0], strict=True):
             right = inked[np.linalg.norm(true_px - centre, axis=1).argmin()] == found
             # A damaged cell need not be found, but its number must be right too.
             self.right += int(right and truth.cell_visible[found])
@@ -131,10 +131,10 @@ def compare_methods(condition: NumberingCondition) -> tuple[CellCount, CellCount
             found = np.full(len(triangles.ink), -1) if numbering is None else numbering.cell_of_triangle
             article.add(found, triangles.corner_px.mean(axis=1), reference, truth)
             numbered = extractor.extract(image).stages.get("triangles")
-            cells, center_px = (np.zeros(0, np.int32), np.zeros((0, 2)))
+            cells, centre_px = (np.zeros(0, np.int32), np.zeros((0, 2)))
             if numbered is not None:
-                cells, center_px = colored[numbered.cell], numbered.center_px
-            registered.add(cells, center_px, reference, truth)
+                cells, centre_px = colored[numbered.cell], numbered.centre_px
+            registered.add(cells, centre_px, reference, truth)
     return article, registered
 
 

@@ -40,7 +40,7 @@ class Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class PictureCounts:
     """What was read of a picture: numbers of markers; (N, 2) errors and (N,) errors over covariances of measured
     markers."""
 
@@ -99,7 +99,7 @@ def _reader(pattern: str, layers: int, code: int) -> Extractor:
     return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers, code))))
 
 
-def read_picture(number: int, suite: str, seed: int, code: int) -> Reading:
+def read_picture(number: int, suite: str, seed: int, code: int) -> PictureCounts:
     """Draw and read one picture."""
     picture = SUITES[suite](number, seed, code)
     layout, true_px = picture.layout, picture.marker_xy_px
@@ -108,7 +108,7 @@ def read_picture(number: int, suite: str, seed: int, code: int) -> Reading:
     reported = np.isfinite(markers.xy_px).all(axis=1)
     wrong = reported & ~(np.linalg.norm(error_px, axis=1) <= WRONG_SHARE * shortest_edges(layout, true_px))
     measured = (markers.status == Status.MEASURED) & picture.visible & ~wrong
-    return Reading(
+    return PictureCounts(
         visible=int(picture.visible.sum()),
         reported=int((reported & picture.visible).sum()),
         wrong=int(wrong.sum()),

@@ -10,10 +10,10 @@ from itertools import count, islice
 from typing import NamedTuple
 
 from benchmarks.frame.parallel import results_of
-from benchmarks.suites.views.views import DAMAGED, View, ViewResult, read_view
+from benchmarks.suites.views.views import DAMAGED, DrawnView, ViewResult, read_view
 
 CODE, PITCH_PX = 7, (24.0, 76.0)
-LEAST_BLACK_CELLS = 60
+MIN_BLACK_CELLS = 60
 GROUPS = {"60 to 119 black cells": (60, 120), "120 and more": (120, 10**6)}
 
 
@@ -30,7 +30,7 @@ class CropCounts(NamedTuple):
 def both_read(number_of_seed: tuple[int, int]) -> tuple[ViewResult, ViewResult]:
     """A crop of a coded pad, and of the plain one."""
     number, seed = number_of_seed
-    coded, plain = (read_view(View(DAMAGED, seed, number, code, PITCH_PX)) for code in (CODE, 0))
+    coded, plain = (read_view(DrawnView(DAMAGED, seed, number, code, PITCH_PX)) for code in (CODE, 0))
     return coded, plain
 
 
@@ -40,7 +40,7 @@ def read_crops(crops: int, seed: int, processes: int) -> Iterator[tuple[ViewResu
     while crops > 0:
         some = [(number, seed) for number in islice(numbers, 2 * crops)]
         for coded, plain in results_of(both_read, some, processes):
-            if coded.black_cells >= LEAST_BLACK_CELLS and crops > 0:
+            if coded.black_cells >= MIN_BLACK_CELLS and crops > 0:
                 crops -= 1
                 yield coded, plain
 

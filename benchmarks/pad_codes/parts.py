@@ -21,10 +21,10 @@ from extractor.numbering.witnesses import BrightPlaces
 
 CODES = 16
 NAMING_LEAD = 20.0  # log odds of the right naming; the inks are seen
-LEAST_BITS = 30
+MIN_BITS = 30
 PARTS_AT_ONCE = 200  # of one pad
 NO_COLORS = np.zeros((0, 3))
-GROUPS = {"30 to 59 known bits": (LEAST_BITS, 60), "60 to 119": (60, 120), "120 and more": (120, 10**6)}
+GROUPS = {"30 to 59 known bits": (MIN_BITS, 60), "60 to 119": (60, 120), "120 and more": (120, 10**6)}
 NO_BRIGHT_PLACES = BrightPlaces(0, 0)
 STEPS_BESIDE = np.array([[0, 0], [-1, 0], [-1, 1]])  # from a down-cell to the up-cells that share its sides
 LATTICE_STEPS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
@@ -141,7 +141,7 @@ def seen_part(
     fields = InkFields(NO_COLORS, NO_COLORS, down, whiteness, whiteness > BRIGHT, 1.0)
     zeros = np.zeros((len(axial), 8))
     cells = WalkedCells(
-        center_px=zeros[:, :2],
+        centre_px=zeros[:, :2],
         corner_px=zeros[:, 2:].reshape(-1, 3, 2),
         axial=axial,
         first=np.zeros(len(axial), np.int8),
@@ -169,7 +169,7 @@ def judged(pads: list[Pad], rng: np.random.Generator) -> Iterator[tuple[str, str
     whiteness = abused_whiteness(pad.is_white, pad.down_place, near, rng)
     bits = (np.isfinite(whiteness) & near).sum(axis=1)
     read_as = np.where(rng.random(PARTS_AT_ONCE) < 2 / 3, 0, rng.integers(1, len(pads), PARTS_AT_ONCE))
-    for number in np.flatnonzero(bits >= LEAST_BITS):
+    for number in np.flatnonzero(bits >= MIN_BITS):
         part, places = parts[number], pad.lattice.axial[parts[number]]
         seen = seen_part(places, axial[part], down[near[number]], whiteness[number, near[number]])
         other = int(read_as[number])

@@ -42,8 +42,8 @@ def windows_of(pad: Pad, radius: int) -> list[Window]:
     layers = pad.lattice.layers - radius
     span = np.arange(-layers, layers + 1)
     found = []
-    for center in [(q, r) for q in span for r in span if abs(q + r) <= layers]:
-        corners = (pad.down - center)[:, None] + DOWN_CORNERS
+    for centre in [(q, r) for q in span for r in span if abs(q + r) <= layers]:
+        corners = (pad.down - centre)[:, None] + DOWN_CORNERS
         inside = np.abs(corners).max(axis=(1, 2)) <= radius
         inside &= np.abs(corners.sum(axis=2)).max(axis=1) <= radius
         beside = np.unique(pad.beside[inside])

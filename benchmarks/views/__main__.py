@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from benchmarks.frame.experiment import COMMIT, Experiment, Found, Shown
 from benchmarks.frame.parallel import PROCESSES, results_of
 from benchmarks.frame.table import TEXT, Table
-from benchmarks.suites.views.views import KINDS, View, ViewResult, read_view
+from benchmarks.suites.views.views import KINDS, DrawnView, ViewResult, read_view
 
 COLUMNS = {
     "views": TEXT, "count": "d", "share": ".1%", "read": "d", "read share": ".1%", "wrong ids": "d",
@@ -38,7 +38,7 @@ def measure(views: int = 300, seed: int = COMMIT, processes: int = PROCESSES) ->
     Args:
         views: of each kind.
     """
-    drawn = [View(kind, seed, number) for kind in KINDS for number in range(views)]
+    drawn = [DrawnView(kind, seed, number) for kind in KINDS for number in range(views)]
     results, rows = results_of(read_view, drawn, processes), []
     for kind in KINDS:
         of_kind = [result for result in results if result.view.kind == kind]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from cmpdesign.errors import CmpDesignError, parameter
-from cmpdesign.inputs.files import MOST_PIXELS, require_suffix
+from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
 from cmpdesign.inputs.options import Preset, Response, Side, Written
 from cmpdesign.watch import tell
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cmpdesign.sensor.sensor_file import SensorFile
     from extractor import LayoutLike, LearntLayout, Markers, Reference, Rig
 
-MOST_WAY_MM = 100  # of a step
+MAX_WAY_MM = 100  # of a step
 
 
 def calibrate_camera(
@@ -40,7 +40,7 @@ def calibrate_camera(
     *,
     preset: Preset = "balanced",
     response: Response | None = None,
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> CalibrateCameraDocument:
     """Calibrate a camera: focal lengths, principal point, distortion, with covariances. Take pictures at many tilts.
 
@@ -127,7 +127,7 @@ def calibrate_pattern(
     *,
     preset: Preset = "accurate",
     response: Response | None = None,
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> CalibratePatternDocument:
     """Measure the places of one pad's markers. Read the pad's pictures with the written layout.
 
@@ -207,7 +207,7 @@ def calibrate_rig(
     ] = None,
     step_sigma_mm: Annotated[float, Written(metavar="MM", least=1e-6)] = 0.002,
     side: Side = "designed",
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> CalibrateRigDocument:
     """Calibrate the views, the window and the gel of a sensor. What remains undetermined is stated and named.
 
@@ -236,8 +236,8 @@ def calibrate_rig(
 
     ways = dict(steps or {})
     for way_mm in ways:
-        if not -MOST_WAY_MM <= way_mm <= MOST_WAY_MM:
-            raise CmpDesignError(f"{parameter('steps')}: a way of {way_mm:g} mm, limit {MOST_WAY_MM} mm")
+        if not -MAX_WAY_MM <= way_mm <= MAX_WAY_MM:
+            raise CmpDesignError(f"{parameter('steps')}: a way of {way_mm:g} mm, limit {MAX_WAY_MM} mm")
     require_suffix("output", output, ".toml")
     sensor, reference = load_sensor_file(rig), reference_from(layout)
     if output is not None:
@@ -297,7 +297,7 @@ def calibrate_check(
     images: Annotated[str | Path | Sequence[str | Path], Written(metavar="REST")],
     *,
     layout: LayoutLike | AnyLayout | None = None,
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> CalibrateCheckDocument:
     """Check a sensor's calibration by its pad at rest. If it does not hold, the cause and the step to repeat are named.
 

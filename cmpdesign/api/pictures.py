@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written, settled
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ class Verifier:
     response: Response | None = None
     channels: Channels = "bgr"
     sheet_dpi: float | None = None
-    max_pixels: int = MOST_PIXELS
+    max_pixels: int = MAX_PIXELS
     preset: Preset = "balanced"
 
     @property
@@ -275,7 +275,7 @@ class VerifyOptions(TypedDict, total=False):
     preset: Annotated[Preset, Usual("balanced")]
     response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
     channels: Annotated[Channels, Usual("bgr")]
-    max_pixels: Annotated[int, Usual(MOST_PIXELS, metavar="COUNT", least=256)]
+    max_pixels: Annotated[int, Usual(MAX_PIXELS, metavar="COUNT", least=256)]
 
 
 def verify(

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.inputs.options import Written, settled
 from cmpdesign.tracking.jobs.options import ShapeOptions, TrackOptions
 
@@ -152,7 +152,7 @@ def reconstruct_job(
 def open_source(
     source: AnySource,
     fps: float | None = None,
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
     times: str | None = None,
     bits: int | None = None,
     camera: CameraSettings | None = None,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cmpdesign.errors import CmpDesignError, parameter
-from cmpdesign.inputs.files import MOST_PIXELS, require_suffix
+from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
 from cmpdesign.inputs.options import Preset, Response, Written
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def kerf(
     *,
     face: Literal["front", "back"] | None = None,
     response: Response | None = None,
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> KerfDocument:
     """Measure the kerf on a cut coupon.
 
@@ -62,7 +62,7 @@ def laser_grid(
     photo: str | Path,
     *,
     response: Response | None = None,
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> GridDocument:
     """Read which settings cut through, in a photo of a burnt grid, as the command ``kerf`` does with a grid.json.
 
@@ -163,7 +163,7 @@ def export_lerobot(
     fps: Annotated[float | None, Written(above=0)] = None,
     robot: str | None = None,
     images: Annotated[Sequence[str | Path], Written(metavar="SOURCE")] = (),
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> ExportDocument:
     """Write a data set that LeRobot loads: displacement, position and status of every marker, and images if given.
 
@@ -206,7 +206,7 @@ def export_zarr(
     output: Annotated[str | Path, Written(metavar="FOLDER")],
     *,
     images: Annotated[Sequence[str | Path], Written(metavar="SOURCE")] = (),
-    max_pixels: int = MOST_PIXELS,
+    max_pixels: int = MAX_PIXELS,
 ) -> ExportDocument:
     """Write a replay buffer in the form of Diffusion Policy: the frames of all runs, and meta/episode_ends.
 

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 MIN_PICTURES = 3
 MIN_POINTS = 12  # of a picture; twice as many numbers as a pose and a focal length need, three times
-MOST_REFUSED = 0.4  # share of the pictures that may contradict the others
+MAX_REFUSED = 0.4  # share of the pictures that may contradict the others
 REFUSING_ROUNDS = 3
 MAX_FOCAL_DEVIATION = 0.01  # of the focal length, above which it counts as not determined
 HELD = 0.5  # deviation of a parameter over that of usual cameras, from which it counts as not determined
@@ -126,10 +126,10 @@ def calibrate_points(
         if not bad.any():
             break
         used = used[~bad]
-        if len(used) < max(MIN_PICTURES, (1 - MOST_REFUSED) * len(sightings)):
+        if len(used) < max(MIN_PICTURES, (1 - MAX_REFUSED) * len(sightings)):
             raise CmpDesignError(
                 f"{len(sightings) - len(used)} of {len(sightings)} pictures contradict the others; at most "
-                f"{MOST_REFUSED:.0%} may, and {MIN_PICTURES} must remain; keep sheet, lens and focus as they are, and "
+                f"{MAX_REFUSED:.0%} may, and {MIN_PICTURES} must remain; keep sheet, lens and focus as they are, and "
                 "take the pictures again"
             )
         kept = replace(problem, sightings=tuple(sightings[int(i)] for i in used))

@@ -17,7 +17,7 @@ from cmpdesign.calibration.pictures import SheetPictures
 Response = Literal["srgb", "linear"] | float
 
 CANDIDATES: tuple[Response, ...] = ("srgb", 1.8, 2.0, 2.2, 2.4, 2.6)
-MOST_PICTURES = 6  # about, that are read with each candidate
+MAX_PICTURES = 6  # about, that are read with each candidate
 BETTER = 0.9  # residuals over those of sRGB, from which another relation is taken
 
 
@@ -31,7 +31,7 @@ def likely_response(
         read: reads pictures with a relation; by their names, or all.
     """
     adjusted = found.adjusted
-    few = list(range(0, len(adjusted.guess.views), max(len(adjusted.guess.views) // MOST_PICTURES, 1)))
+    few = list(range(0, len(adjusted.guess.views), max(len(adjusted.guess.views) // MAX_PICTURES, 1)))
     names = [adjusted.problem.sightings[v].name for v in few]
     start = Guess(tuple(adjusted.guess.views[v] for v in few), adjusted.guess.shape)
     errors: dict[Response, float] = {}

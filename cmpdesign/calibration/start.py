@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 FIELDS_DEG = (14, 20, 28, 38, 50, 64, 80, 98, 118)  # across the width, for the scan
 WIDE_DEG = 60  # field from which an equidistant lens is tried, too
-MOST_POINTS, MOST_VIEWS = 40, 10  # for the scan
+MAX_POINTS, MAX_VIEWS = 40, 10  # for the scan
 
 
 def first_guess(sheet: Sheet, sightings: Sequence[Sighting], size_px: tuple[int, int]) -> Guess:
@@ -28,7 +28,7 @@ def first_guess(sheet: Sheet, sightings: Sequence[Sighting], size_px: tuple[int,
     Raises:
         CmpDesignError: no camera explains them.
     """
-    some = [sightings[i] for i in _subset(len(sightings), MOST_VIEWS)]
+    some = [sightings[i] for i in _subset(len(sightings), MAX_VIEWS)]
     best, least = None, np.inf
     for camera in _cameras(size_px):
         placed = [_place(camera, sheet, one) for one in some]
@@ -63,7 +63,7 @@ def _cameras(size_px: tuple[int, int]) -> Iterator[View]:
             yield MODELS[0].view(np.array([focal_px, focal_px, *middle, 0, 0, 0, 0]))
 
 
-def _subset(count: int, most: int = MOST_POINTS) -> NDArray[np.intp]:
+def _subset(count: int, most: int = MAX_POINTS) -> NDArray[np.intp]:
     """At most this many of the numbers below ``count``, evenly."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 

@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 # Of an error or a warning: no message of the program is as long; only texts from files and arguments can be longer.
-MOST_LINE_LETTERS = 1000
+MAX_LINE_LETTERS = 1000
 _HEAD_LETTERS = 700  # letters before the cut; the remedy stands at the end of a line
 _STARTED = time.perf_counter()
 
 
 def shortened(text: str) -> str:
-    """The text, cut in the middle at ``MOST_LINE_LETTERS``."""
-    if len(text) <= MOST_LINE_LETTERS:
+    """The text, cut in the middle at ``MAX_LINE_LETTERS``."""
+    if len(text) <= MAX_LINE_LETTERS:
         return text
     gap = " ... "
-    return text[:_HEAD_LETTERS] + gap + text[len(text) - (MOST_LINE_LETTERS - _HEAD_LETTERS - len(gap)) :]
+    return text[:_HEAD_LETTERS] + gap + text[len(text) - (MAX_LINE_LETTERS - _HEAD_LETTERS - len(gap)) :]
 
 
 def console(stderr: bool = False) -> Console:
@@ -66,7 +66,7 @@ def is_expected(error: BaseException) -> bool:
 
 
 def error_on_one_line(error: BaseException | str) -> str:
-    """The error's message: one line of printable characters, at most ``MOST_LINE_LETTERS``."""
+    """The error's message: one line of printable characters, at most ``MAX_LINE_LETTERS``."""
     return shortened(visible(" ".join(str(error).split())))
 
 

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 GRAVITY_M_S2 = 9.80665
 FEWEST_WEIGHTS = 3
 COLUMNS = ("frame", "mass_g")
-MOST_FRAME = 10**9
+MAX_FRAME = 10**9
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def parse_weights(text: str, name: str) -> Weights:
             frame, mass = int(row[0]), float(row[1])
         except (ValueError, IndexError):
             raise CmpDesignError(f"{name}, line {line}: expected a frame's number and a mass in g") from None
-        if not (0 <= frame < MOST_FRAME and 0 < mass < float("inf") and len(row) == len(COLUMNS)):
+        if not (0 <= frame < MAX_FRAME and 0 < mass < float("inf") and len(row) == len(COLUMNS)):
             raise CmpDesignError(f"{name}, line {line}: expected a frame from 0 and a mass above 0 g")
         frames.append(frame)
         masses.append(mass)

@@ -18,7 +18,7 @@ from cmpdesign.contact.objects.indenters import Ball, Cube, Cylinder, Indenter, 
 from cmpdesign.contact.result import Contact
 from cmpdesign.contact.solve import solve
 from cmpdesign.inputs.names import nearest_name
-from cmpdesign.inputs.validation import MOST_ERRORS, shown_value
+from cmpdesign.inputs.validation import MAX_ERRORS, shown_value
 from cmpdesign.units import parse_angle_deg, parse_length_mm
 
 INDENTER_KINDS: Mapping[str, type[Indenter]] = {
@@ -130,7 +130,7 @@ def _validate_table(model: type[Model], table: Mapping[str, Any], where: str) ->
     try:
         return model.model_validate(dict(table))
     except ValidationError as error:
-        items = error.errors()[:MOST_ERRORS]
+        items = error.errors()[:MAX_ERRORS]
         raise ContactError("; ".join(_error_message(item, model, where) for item in items)) from None
 
 

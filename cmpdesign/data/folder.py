@@ -32,7 +32,7 @@ from cmpdesign.data.records import (
     FORMAT_FRAMES,
     FORMAT_MANIFEST,
     FORMAT_RECORD,
-    MOST_DIGITS,
+    MAX_DIGITS,
     PLAN_KINDS,
     Manifest,
     ShardRecord,
@@ -54,7 +54,7 @@ PLAN, MANIFEST, UNFINISHED = "plan.json", "manifest.json", "unfinished"
 # Keys on which no frame depends.
 OUTSIDE_DIGEST = ("digest", "frames", "name", "description")
 BLOCK_BYTES = 1 << 20
-_RECORD_NAME = re.compile(rf"([0-9]{{{MOST_DIGITS},9}})\.json")
+_RECORD_NAME = re.compile(rf"([0-9]{{{MAX_DIGITS},9}})\.json")
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +171,7 @@ def shard_files(plan: Mapping[str, Any], number: int) -> set[str]:
 
 def shard_name(number: int) -> str:
     """The name of a shard's files, without ending."""
-    return f"{number:0{MOST_DIGITS}d}"
+    return f"{number:0{MAX_DIGITS}d}"
 
 
 def find_record(folder: Path, plan: Mapping[str, Any], number: int) -> ShardRecord | None:

@@ -9,16 +9,16 @@ from pydantic import Field
 
 from cmpdesign.inputs.names import Line, Name
 from cmpdesign.inputs.options import Preset
-from cmpdesign.inputs.records import MOST_COUNT, Digest, Record
+from cmpdesign.inputs.records import MAX_COUNT, Digest, Record
 
 FORMAT_FRAMES, FORMAT_EXTRACTION = "cmp-dataset-plan", "cmp-extraction-plan"
 FORMAT_RECORD, FORMAT_MANIFEST = "cmp-dataset-shard", "cmp-dataset"
-MOST_FRAMES = 10**9
-MOST_FRAMES_A_SHARD = 100_000
-MOST_DESIGNS = 1000
-MOST_DIGITS = 6  # of a shard's number
-Count = Annotated[int, Field(ge=0, le=MOST_COUNT)]
-Stamp = Annotated[int, Field(ge=-MOST_COUNT * 8, le=MOST_COUNT * 8)]
+MAX_FRAMES = 10**9
+MAX_FRAMES_A_SHARD = 100_000
+MAX_DESIGNS = 1000
+MAX_DIGITS = 6  # of a shard's number
+Count = Annotated[int, Field(ge=0, le=MAX_COUNT)]
+Stamp = Annotated[int, Field(ge=-MAX_COUNT * 8, le=MAX_COUNT * 8)]
 InputName = Annotated[str, Field(pattern=r"^inputs/[0-9a-f]{16}(\.[a-z]{3,4})?$")]
 PlainName = Annotated[str, Field(pattern=r"^[^/\\\x00-\x1f]+$", max_length=200)]
 
@@ -55,12 +55,12 @@ class FramesPlan(Record):
     made_with: Name
     name: Name
     description: Line
-    frames: int = Field(ge=1, le=MOST_FRAMES)
-    frames_a_shard: int = Field(ge=1, le=MOST_FRAMES_A_SHARD)
+    frames: int = Field(ge=1, le=MAX_FRAMES)
+    frames_a_shard: int = Field(ge=1, le=MAX_FRAMES_A_SHARD)
     seed: int = Field(ge=0)
     image: ImageTable
     markers: MarkersTable
-    designs: list[DesignRecord] = Field(min_length=1, max_length=MOST_DESIGNS)
+    designs: list[DesignRecord] = Field(min_length=1, max_length=MAX_DESIGNS)
     weights: list[float] | None
     largest_strain: float | None
     inputs: dict[InputName, Digest]
@@ -95,7 +95,7 @@ class SourceRecord(Record):
     kind: Literal["video", "pictures"]
     location: list[Annotated[str, Field(min_length=1, max_length=10_000)]] = Field(min_length=1)
     sha256: Digest
-    frames: int = Field(ge=1, le=MOST_FRAMES)
+    frames: int = Field(ge=1, le=MAX_FRAMES)
     ranges: list[Annotated[list[Stamp], Field(min_length=4, max_length=4)]] = Field(min_length=1)
 
 
@@ -105,7 +105,7 @@ class ExtractionPlan(Record):
     format: Literal["cmp-extraction-plan"]
     version: Literal[1]
     made_with: Name
-    frames: int = Field(ge=1, le=MOST_FRAMES)
+    frames: int = Field(ge=1, le=MAX_FRAMES)
     layout: LayoutRecord
     reading: ReadingRecord
     sources: list[SourceRecord] = Field(min_length=1)

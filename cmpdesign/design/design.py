@@ -16,7 +16,7 @@ from cmpdesign.design.quantities import Angle, Color, Length, LengthOrZero
 from cmpdesign.design.sheet_options import SheetOptions
 from cmpdesign.errors import DesignError, InputError
 from cmpdesign.inputs.documents import parse_toml
-from cmpdesign.inputs.names import MOST_NAME_LETTERS, Line, Name, nearest_name
+from cmpdesign.inputs.names import MAX_NAME_LETTERS, Line, Name, nearest_name
 from cmpdesign.inputs.validation import validation_message
 from cmpdesign.patterns import registered_patterns
 from cmpdesign.patterns.graphs import MAX_LAYERS, TRIANGULAR_GRAPHS
@@ -235,7 +235,7 @@ def load_design(name_or_path: str | Path, overrides: Mapping[str, object] | None
     data = read_design_file(path)
     try:
         _update_overrides(data, overrides or {})
-        data.setdefault("name", path.stem[:MOST_NAME_LETTERS])
+        data.setdefault("name", path.stem[:MAX_NAME_LETTERS])
         return Design(**data)
     except DesignError as error:
         raise DesignError(f"{name_or_path}: {error}") from None

@@ -17,7 +17,7 @@ from cmpdesign.inputs.documents import read_toml
 
 FIELD = "extends"
 OWN_FIELDS = ("name", "description", "source")
-MOST_FILES = 20  # of a chain; the longest useful chain has three or four
+MAX_FILES = 20  # of a chain; the longest useful chain has three or four
 REMOVED = "none"
 
 
@@ -38,10 +38,8 @@ def read_design_file(path: Path) -> dict[str, Any]:
         if any(_is_same(following, earlier) for earlier in chain):
             loop = " -> ".join(map(str, (*chain, following)))
             raise DesignError(f"{path}: extends leads in a circle: {loop}; remove one of the lines")
-        if len(chain) == MOST_FILES:
-            raise DesignError(
-                f"{path}: extends leads through more than {MOST_FILES} files; shorten the chain"
-            )
+        if len(chain) == MAX_FILES:
+            raise DesignError(f"{path}: extends leads through more than {MAX_FILES} files; shorten the chain")
         chain.append(following)
         document = _read(following)
         documents.append(document)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from cmpdesign.errors import CmpDesignError, InputError, parameter
 from cmpdesign.files.image_header import is_raw_of_camera, pictures_in_file, size_in_header
 from cmpdesign.inputs.file_kinds import HEAD_BYTES, RAW, describe_file, is_raw_picture
-from cmpdesign.inputs.files import MOST_PIXELS, open_file, read_file
+from cmpdesign.inputs.files import MAX_PIXELS, open_file, read_file
 from cmpdesign.inputs.sources import has_jpeg_end
 
 SMALLEST_PX = 16
 _HEADER_BYTES = 1 << 16
 _TAIL_BYTES = 4096
 _JPEG_STREAMS = (".mjpeg", ".mjpg")
-FEWEST_BITS, _MOST_BITS = 8, 14  # of a camera's values in a file of 16 bits
+FEWEST_BITS, _MAX_BITS = 8, 14  # of a camera's values in a file of 16 bits
 PNG_PIXELS_PER_BYTE = 8 * 1032  # at most: one bit a pixel, and deflate makes no more than 1032 bytes of one
 _NO_IMAGE = "is not an image that can be read; expected PNG, JPEG, TIFF, BMP or WebP"
 # Endings of images that are written -> largest number of bits.
@@ -47,7 +47,7 @@ class BitRange:
 
 
 def read_image(
-    path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool = False, bits: int | None = None
+    path: str | Path, most_pixels: int = MAX_PIXELS, *, gray: bool = False, bits: int | None = None
 ) -> Image:
     """Read the pixels of an image file.
 
@@ -71,7 +71,7 @@ def read_image(
     return pixels if pixels.dtype != np.uint16 else full_range(pixels, range_of(pixels, path, bits))
 
 
-def read_stored(path: str | Path, most_pixels: int = MOST_PIXELS, *, gray: bool = False) -> Image:
+def read_stored(path: str | Path, most_pixels: int = MAX_PIXELS, *, gray: bool = False) -> Image:
     """As ``read_image``, with the values as they are stored."""
     return _to_bgr(decode_image(path, most_pixels), Path(path), gray)
 
@@ -103,7 +103,7 @@ def is_image_file(path: str | Path) -> bool:
         return False
 
 
-def decode_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:
+def decode_image(path: str | Path, most_pixels: int = MAX_PIXELS) -> NDArray[Any]:
     """Read the pixels of an image file as they are stored: (H, W) or (H, W, C), of any depth.
 
     Raises:
@@ -116,7 +116,7 @@ def decode_image(path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[An
     return decode_bytes(data, path, most_pixels)
 
 
-def decode_bytes(data: bytes, path: str | Path, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:
+def decode_bytes(data: bytes, path: str | Path, most_pixels: int = MAX_PIXELS) -> NDArray[Any]:
     """The pixels in the bytes of an image file, as ``decode_image``; ``path`` is for messages.
 
     Raises:
@@ -189,7 +189,7 @@ def bits_of(used: int) -> BitRange:
     if not used:
         return BitRange(16)
     top, bottom = max(used.bit_length(), FEWEST_BITS), (used & -used).bit_length() - 1
-    if top > _MOST_BITS and bottom < 16 - _MOST_BITS:
+    if top > _MAX_BITS and bottom < 16 - _MAX_BITS:
         return BitRange(16)
     return BitRange(top, min(bottom, top - FEWEST_BITS))
 

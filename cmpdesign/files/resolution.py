@@ -10,7 +10,7 @@ from cmpdesign.files.image_header import open_header
 from cmpdesign.inputs.files import read_file
 
 # Cameras and programs without a resolution write 72 or 96; the code of a sheet is not legible in such coarse scans.
-LEAST_DPI = 100.0
+MIN_DPI = 100.0
 # EXIF: directory of the camera; time and aperture of an exposure, which scanners do not write.
 _CAMERA, _EXPOSURE = 0x8769, (0x829A, 0x829D)
 
@@ -36,6 +36,6 @@ def resolution_dpi(path: str | Path) -> tuple[float, float] | str:
         return "the resolution tag of a photo is not the resolution of the sheet"
     if not stated:
         return "the file states no resolution"
-    if not (x >= LEAST_DPI and y >= LEAST_DPI):
+    if not (x >= MIN_DPI and y >= MIN_DPI):
         return f"the file states {x:.3g} dpi, the default of programs that know no resolution"
     return x, y

@@ -12,9 +12,9 @@ from typing import Any
 from cmpdesign.errors import InputError
 from cmpdesign.inputs.files import read_text
 
-MOST_LEVELS = 40  # of tables and lists in each other; the deepest format has 5
-MOST_BRACKETS = 1 << 19  # lists and tables of a document; a layout of 60 layers has 54,000
-MOST_DIGITS = 300  # of a whole number; a float of more digits before its point is infinite
+MAX_LEVELS = 40  # of tables and lists in each other; the deepest format has 5
+MAX_BRACKETS = 1 << 19  # lists and tables of a document; a layout of 60 layers has 54,000
+MAX_DIGITS = 300  # of a whole number; a float of more digits before its point is infinite
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -37,9 +37,9 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{name} is no valid TOML: {error}") from None
     except RecursionError:
-        raise InputError(f"{name}: is nested more than {MOST_LEVELS} levels deep") from None
+        raise InputError(f"{name}: is nested more than {MAX_LEVELS} levels deep") from None
     except ValueError:  # the interpreter's limit on the digits of an integer
-        raise InputError(f"{name}: holds a number of more than {MOST_DIGITS} digits") from None
+        raise InputError(f"{name}: holds a number of more than {MAX_DIGITS} digits") from None
     require_plain_values(document, name)
     return document
 
@@ -59,18 +59,18 @@ def parse_json(text: str, name: str) -> Any:
     Raises:
         InputError: no JSON, or beyond a limit.
     """
-    if text.count("[") + text.count("{") > MOST_BRACKETS:
-        raise InputError(f"{name}: holds more than {MOST_BRACKETS} lists and objects")
+    if text.count("[") + text.count("{") > MAX_BRACKETS:
+        raise InputError(f"{name}: holds more than {MAX_BRACKETS} lists and objects")
     try:
         value = json.loads(text, object_pairs_hook=_refuse_repeated)
     except json.JSONDecodeError as error:
         raise InputError(f"{name} is no JSON: {error}") from None
     except RecursionError:
-        raise InputError(f"{name}: is nested more than {MOST_LEVELS} levels deep") from None
+        raise InputError(f"{name}: is nested more than {MAX_LEVELS} levels deep") from None
     except _RepeatedName as error:
         raise InputError(f"{name}: the field {error} is given more than once") from None
     except ValueError:  # the interpreter's limit on the digits of an integer
-        raise InputError(f"{name}: holds a number of more than {MOST_DIGITS} digits") from None
+        raise InputError(f"{name}: holds a number of more than {MAX_DIGITS} digits") from None
     require_plain_values(value, name, finite=True)
     return value
 
@@ -87,7 +87,7 @@ def require_plain_values(document: Any, name: str, *, finite: bool = False) -> N
         InputError: nested too deeply, a number that is not allowed, or a text with half a surrogate pair.
     """
     level: list[Any] = [document]
-    for _ in range(MOST_LEVELS):
+    for _ in range(MAX_LEVELS):
         inner: list[Any] = []
         for value in level:
             if isinstance(value, Mapping):
@@ -97,14 +97,14 @@ def require_plain_values(document: Any, name: str, *, finite: bool = False) -> N
                 inner.extend(value)
             elif isinstance(value, str):
                 _require_plain_texts((value,), name)
-            elif isinstance(value, int) and abs(value) >= 10**MOST_DIGITS:
-                raise InputError(f"{name}: holds a number of more than {MOST_DIGITS} digits")
+            elif isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
+                raise InputError(f"{name}: holds a number of more than {MAX_DIGITS} digits")
             elif finite and isinstance(value, float) and not math.isfinite(value):
                 raise InputError(f"{name}: holds the number {value}; expected finite numbers")
         if not inner:
             return
         level = inner
-    raise InputError(f"{name}: is nested more than {MOST_LEVELS} levels deep")
+    raise InputError(f"{name}: is nested more than {MAX_LEVELS} levels deep")
 
 
 def _require_plain_texts(texts: Any, name: str) -> None:

@@ -9,9 +9,9 @@ from typing import BinaryIO
 
 from cmpdesign.errors import CmpDesignError, InputError, parameter
 
-MOST_TEXT_BYTES = 1 << 24  # 16 MiB: of a document; the largest document that a command writes has some 3 MiB
-MOST_PIXELS = 250_000_000  # of an image; A4 at 1200 dpi has 139 million
-MOST_DATA_BYTES = 1 << 31  # 2 GiB: of an image or an array
+MAX_TEXT_BYTES = 1 << 24  # 16 MiB: of a document; the largest document that a command writes has some 3 MiB
+MAX_PIXELS = 250_000_000  # of an image; A4 at 1200 dpi has 139 million
+MAX_DATA_BYTES = 1 << 31  # 2 GiB: of an image or an array
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -61,7 +61,7 @@ def open_file(path: str | Path) -> BinaryIO:
         raise
 
 
-def read_file(path: str | Path, most_bytes: int = MOST_DATA_BYTES) -> bytes:
+def read_file(path: str | Path, most_bytes: int = MAX_DATA_BYTES) -> bytes:
     """Read a regular file. The function does not wait for a pipe.
 
     Args:
@@ -92,7 +92,7 @@ def require_size(file: BinaryIO, path: str | Path, most_bytes: int) -> None:
         raise _too_large(path, most_bytes)
 
 
-def read_text(path: str | Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
+def read_text(path: str | Path, most_bytes: int = MAX_TEXT_BYTES) -> str:
     """Read a regular file of UTF-8 text.
 
     Raises:

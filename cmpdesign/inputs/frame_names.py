@@ -21,7 +21,7 @@ from typing import Literal
 NS_PER_S = 10**9
 _FIRST_UNIX_S, _LAST_UNIX_S = 10**9, 4 * 10**9  # the years 2001 to 2096
 _UNIX_DIGITS = {10: NS_PER_S, 13: 10**6, 16: 10**3, 19: 1}  # digits of a time since 1970 -> ns of its unit
-_MOST_SPREAD = (
+_MAX_SPREAD = (
     100  # numbers that span more than this multiple of their count are no frame numbers, but dates or codes
 )
 
@@ -116,6 +116,6 @@ def _numbers(stems: Sequence[str]) -> NamedTimes | None:
     if len(found) < len(stems) or len({(match[1], match[3]) for match in found}) > 1:
         return None
     values = tuple(int(match[2]) for match in found)
-    if max(values) - min(values) >= _MOST_SPREAD * len(values):
+    if max(values) - min(values) >= _MAX_SPREAD * len(values):
         return None
     return NamedTimes("numbers", values)

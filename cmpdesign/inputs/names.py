@@ -8,9 +8,9 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-MOST_NAME_LETTERS = 100
-MOST_LINE_LETTERS = 1000
-_MOST_COMPARED = 60  # letters of an unknown name that are compared with the known ones
+MAX_NAME_LETTERS = 100
+MAX_LINE_LETTERS = 1000
+_MAX_COMPARED = 60  # letters of an unknown name that are compared with the known ones
 
 
 def nearest_name(word: object, known: Iterable[str]) -> str:
@@ -19,7 +19,7 @@ def nearest_name(word: object, known: Iterable[str]) -> str:
     >>> nearest_name("honeycom", ["round", "honeycomb"])
     ' (did you mean honeycomb?)'
     """
-    found = difflib.get_close_matches(str(word)[:_MOST_COMPARED], list(known), n=1, cutoff=0.5)
+    found = difflib.get_close_matches(str(word)[:_MAX_COMPARED], list(known), n=1, cutoff=0.5)
     return f" (did you mean {found[0]}?)" if found else ""
 
 
@@ -38,6 +38,6 @@ def one_printable_line(value: str) -> str:
 
 # A name of a design, a machine, a material, a product: names are written to XML, job sheets, file names and the
 # terminal.
-Name = Annotated[str, Field(max_length=MOST_NAME_LETTERS), AfterValidator(one_printable_line)]
+Name = Annotated[str, Field(max_length=MAX_NAME_LETTERS), AfterValidator(one_printable_line)]
 # A sentence: a source, a description, a remedy.
-Line = Annotated[str, Field(max_length=MOST_LINE_LETTERS), AfterValidator(one_printable_line)]
+Line = Annotated[str, Field(max_length=MAX_LINE_LETTERS), AfterValidator(one_printable_line)]

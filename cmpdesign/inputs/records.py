@@ -11,7 +11,7 @@ from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.validation import validation_message
 
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]  # SHA-256
-MOST_COUNT = 1 << 60
+MAX_COUNT = 1 << 60
 
 
 class Record(BaseModel):

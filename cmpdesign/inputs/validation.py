@@ -9,8 +9,8 @@ from pydantic import BaseModel, ValidationError
 
 from cmpdesign.inputs.names import nearest_name
 
-MOST_ERRORS = 5
-_MOST_VALUE_LETTERS = 60
+MAX_ERRORS = 5
+_MAX_VALUE_LETTERS = 60
 _UNITS = ("mm", "deg", "px")
 
 
@@ -22,9 +22,9 @@ def validation_message(error: ValidationError, model: type[BaseModel]) -> str:
         model: the class of the whole document.
     """
     items = error.errors()
-    parts = [_item_message(item, model) for item in items[:MOST_ERRORS]]
-    if len(items) > MOST_ERRORS:
-        parts.append(f"and {len(items) - MOST_ERRORS} more")
+    parts = [_item_message(item, model) for item in items[:MAX_ERRORS]]
+    if len(items) > MAX_ERRORS:
+        parts.append(f"and {len(items) - MAX_ERRORS} more")
     return "; ".join(parts)
 
 
@@ -33,12 +33,12 @@ def shown_value(value: object) -> str:
     match value:
         case Mapping():
             return f"a table of {len(value)} fields"
-        case list() | tuple() if len(repr(value)) > _MOST_VALUE_LETTERS:
+        case list() | tuple() if len(repr(value)) > _MAX_VALUE_LETTERS:
             return f"a list of {len(value)}"
         case int() if not isinstance(value, bool) and abs(value) >= 10**30:
             return f"a whole number of {value.bit_length()} bits"
-        case str() if len(value) > _MOST_VALUE_LETTERS:
-            return repr(value[:_MOST_VALUE_LETTERS] + "...")
+        case str() if len(value) > _MAX_VALUE_LETTERS:
+            return repr(value[:_MAX_VALUE_LETTERS] + "...")
     return repr(value)
 
 

@@ -21,7 +21,7 @@ from typing import Any
 
 from cmpdesign.errors import SourceError, parameter
 from cmpdesign.inputs.file_kinds import describe_file
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.libraries import extra
 
 # FFmpeg's names of formats: containers with times, and bare streams, whose times FFmpeg would invent.
@@ -30,7 +30,7 @@ BARE_FORMATS = ("h264", "hevc", "mjpeg", "mpjpeg", "m4v", "mpegvideo", "obu", "a
 _NETWORK = "rtsp,rtsps,rtmp,rtmps,rtp,srtp,udp,tcp,tls,http,https,httpproxy,crypto"
 STREAM_TIMEOUT_S = 4.0  # for opening and reading; a stop waits at most this time
 _DECLARING = ("mov", "matroska", "avi")  # formats whose files state their length
-_MOST_STEPS = 2.5  # the stated length may exceed the read length by this number of the largest steps
+_MAX_STEPS = 2.5  # the stated length may exceed the read length by this number of the largest steps
 _JPEG_END = b"\xff\xd9"
 CUT_OFF = "the frame is cut off: its JPEG has no end"
 NOT_DECODED = "cannot be decoded"
@@ -71,7 +71,7 @@ class VideoFacts:
 
 
 @contextmanager
-def opened_video(path: Path, most_pixels: int = MOST_PIXELS) -> Iterator[Any]:
+def opened_video(path: Path, most_pixels: int = MAX_PIXELS) -> Iterator[Any]:
     """A PyAV container with a video, decoded by one thread.
 
     Raises:
@@ -97,7 +97,7 @@ def opened_video(path: Path, most_pixels: int = MOST_PIXELS) -> Iterator[Any]:
 
 
 @contextmanager
-def opened_stream(address: str, name: str, most_pixels: int = MOST_PIXELS) -> Iterator[Any]:
+def opened_stream(address: str, name: str, most_pixels: int = MAX_PIXELS) -> Iterator[Any]:
     """A PyAV container with a network stream; no file of this machine is read, whatever the stream names.
 
     Raises:
@@ -199,7 +199,7 @@ def early_end(facts: VideoFacts, times_s: list[float]) -> str:
         return ""
     step_s = max((b - a for a, b in pairwise(known)), default=0.0)
     step_s = max(step_s, 1 / facts.fps if facts.fps else 0.0)
-    if facts.length_s - known[-1] <= _MOST_STEPS * step_s:
+    if facts.length_s - known[-1] <= _MAX_STEPS * step_s:
         return ""
     return f"the video ends at {known[-1] + step_s:.3g} s of the {facts.length_s:.3g} s that it states"
 

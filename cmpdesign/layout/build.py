@@ -19,7 +19,7 @@ from cmpdesign.patterns.graphs import MarkerGraph
 from cmpdesign.patterns.numbering import Ints
 from cmpdesign.patterns.pad_code import PadCode, coded_graph
 
-MOST_VIRTUAL_MARKERS = 4_000_000  # of a layout; readers refuse more
+MAX_VIRTUAL_MARKERS = 4_000_000  # of a layout; readers refuse more
 
 
 def build_layout(design: Design) -> Layout:
@@ -80,10 +80,10 @@ def build_layout(design: Design) -> Layout:
 
 
 def _require_few_virtual_markers(design: Design, edges: int) -> None:
-    if design.virtual_per_edge * edges > MOST_VIRTUAL_MARKERS:
+    if design.virtual_per_edge * edges > MAX_VIRTUAL_MARKERS:
         raise DesignError(
-            f"virtual_per_edge = {design.virtual_per_edge} on {edges} edges is more than {MOST_VIRTUAL_MARKERS} "
-            f"virtual markers, which readers refuse; make it at most {MOST_VIRTUAL_MARKERS // edges}"
+            f"virtual_per_edge = {design.virtual_per_edge} on {edges} edges is more than {MAX_VIRTUAL_MARKERS} "
+            f"virtual markers, which readers refuse; make it at most {MAX_VIRTUAL_MARKERS // edges}"
         )
 
 

@@ -32,7 +32,7 @@ MIN_LAYERS, MAX_LAYERS = 4, max(RADIUS_UP_TO_LAYERS)
 LEAD_BITS, LEAD_SHARE = 3, 0.1
 # Any two pads of a size, at every turn, differ in this share of the black cells.
 PAD_DISTANCE = 1 / 8
-MOST_STEPS = 4000
+MAX_STEPS = 4000
 # With so few cells, only these codes keep PAD_DISTANCE.
 ROOM_OF_LAYERS = {4: 7, 5: 21, 6: 36}
 # The searches of these codes, by layers, start from other numbers: with 0, two pads are nearer than PAD_DISTANCE, or
@@ -189,19 +189,19 @@ def cell_rings(cells: Ints) -> NDArray[np.int32]:
 def code_windows(layers: int, radius: int) -> NDArray[np.int32]:
     """(W, K) the cells, as numbers of ``down_cells``, of every window of a radius inside the pattern.
 
-    Columns correspond: windows are turned about their centers until their red cells have the same direction.
+    Columns correspond: windows are turned about their centres until their red cells have the same direction.
     """
     cells, number = down_cells(layers), np.full((2 * layers + 3, 2 * layers + 3), -1)
     number[cells[:, 0] + layers, cells[:, 1] + layers] = np.arange(len(cells))
     span = np.arange(radius - layers, layers - radius + 1)
     q, r = (grid.ravel() for grid in np.meshgrid(span, span, indexing="ij"))
     inside = np.abs(q + r) <= layers - radius
-    centers = np.stack([q, r], axis=1)[inside]
+    centres = np.stack([q, r], axis=1)[inside]
     # The cells around a marker (q, r) follow each other as the cells around (0, 0), turned (q - r) mod 3 times.
     turned = [down_cells(radius)]
     for _ in range(2):
         turned.append(turn_down_cells(turned[-1]))
-    places = centers[:, None] + np.stack(turned)[(centers[:, 0] - centers[:, 1]) % 3]
+    places = centres[:, None] + np.stack(turned)[(centres[:, 0] - centres[:, 1]) % 3]
     return np.asarray(number[places[..., 0] + layers, places[..., 1] + layers], dtype=np.int32)
 
 
@@ -234,7 +234,7 @@ def searched_cells(layers: int, whites: int, code: int, salt: int) -> NDArray[np
         of_ring,
         fixed,
         window_distance(radius),
-        MOST_STEPS,
+        MAX_STEPS,
         ((1000 * salt + whites) * (MAX_LAYERS + 1) + layers) * (MAX_CODE + 1) + code,
     )
     is_white = np.asarray(found, dtype=np.bool_)

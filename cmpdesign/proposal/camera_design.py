@@ -26,7 +26,7 @@ FEWEST_LAYERS = 2
 # Diameter of the circle inside a cell, and the longest period that the markers' lattice does not resolve, in pitches.
 CELL_PITCHES, PERIOD_PITCHES = 1 / math.sqrt(3), math.sqrt(3)
 LARGEST_SIDE_PX, LARGEST_VIEW_MM = 99_999, 10_000.0
-MOST_BLUR_PX, MOST_NOISE = 10.0, 50.0
+MAX_BLUR_PX, MAX_NOISE = 10.0, 50.0
 _PITCH_DECIMALS = 4
 _TWO_NUMBERS = r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*"
 
@@ -219,8 +219,8 @@ def size(
     """
     pixels, seen_mm = _pixels(camera), _view_mm(view)
     imaging = Imaging(
-        _within("blur_px", blur_px, 0.3, MOST_BLUR_PX, "px"),
-        _within("noise", noise, 0.1, MOST_NOISE, "of 255"),
+        _within("blur_px", blur_px, 0.3, MAX_BLUR_PX, "px"),
+        _within("noise", noise, 0.1, MAX_NOISE, "of 255"),
     )
     if make is not None and make not in get_args(Make):
         raise CmpDesignError(f"make {make}: unknown; there are {', '.join(get_args(Make))}")

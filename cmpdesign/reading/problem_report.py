@@ -32,7 +32,7 @@ from cmpdesign.inputs.records import Record, parse_record
 from cmpdesign.libraries import OPENCV_DISTRIBUTIONS
 
 FORMAT, VERSION = "cmp-problem-report", 1
-MOST_PICTURES = 20
+MAX_PICTURES = 20
 _LIBRARIES = ("numpy", *OPENCV_DISTRIBUTIONS, "scipy")
 _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same bundle has the same bytes
 
@@ -60,7 +60,7 @@ class ReportDocument(Record):
     version: Literal[1]
     settings: ReaderSettings
     versions: dict[Name, Name] = Field(max_length=50)
-    pictures: list[ReportedPicture] = Field(min_length=1, max_length=MOST_PICTURES)
+    pictures: list[ReportedPicture] = Field(min_length=1, max_length=MAX_PICTURES)
 
 
 def parse_report(text: str, name: str) -> ReportDocument:
@@ -95,11 +95,11 @@ class ProblemReport:
             stages: name of a stage -> (H, W, 3) BGR picture of the stage's result.
 
         Raises:
-            CmpDesignError: there are ``MOST_PICTURES`` pictures already.
+            CmpDesignError: there are ``MAX_PICTURES`` pictures already.
         """
-        if len(self._pictures) == MOST_PICTURES:
+        if len(self._pictures) == MAX_PICTURES:
             raise CmpDesignError(
-                f"a report of a problem holds at most {MOST_PICTURES} pictures; give those that show the problem, "
+                f"a report of a problem holds at most {MAX_PICTURES} pictures; give those that show the problem, "
                 f"or fewer {parameter('frames')}"
             )
         file = f"pictures/{name}"

@@ -20,7 +20,7 @@ from cmpdesign.tracking.sources import FrameSource, SourceFrame
 
 KEPT_FRAMES = 4  # of which those of several cameras are paired
 SILENT_FRAMES = 1.9  # frame times without a frame, after which it is an event: two are promised
-LEAST_SILENT_S = 0.01  # shorter waits are those of threads; chosen
+MIN_SILENT_S = 0.01  # shorter waits are those of threads; chosen
 STEPS, FEWEST_STEPS = 32, 5  # steps between frames whose median is the frame time
 FIRST_WAIT_S = 3.0  # for the first frame of a camera; chosen
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.1, 5.0  # before a camera is opened again; doubled each time; chosen
@@ -101,7 +101,7 @@ class Camera:
         if self._is_silent or self.is_over:
             return float("inf")
         frame_s = self.frame_s if self._number >= 0 else None
-        limit_s = FIRST_WAIT_S if frame_s is None else max(SILENT_FRAMES * frame_s, LEAST_SILENT_S)
+        limit_s = FIRST_WAIT_S if frame_s is None else max(SILENT_FRAMES * frame_s, MIN_SILENT_S)
         return max(self._arrived_s + limit_s - time.monotonic(), 0.0)
 
     def note_silence(self) -> None:

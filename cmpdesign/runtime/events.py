@@ -11,7 +11,7 @@ from threading import Lock
 
 LOGGER = logging.getLogger("cmpdesign.runtime")
 LOGGER.addHandler(logging.NullHandler())  # a program decides what it shows
-MOST_EVENTS = 1000  # that are kept; chosen
+MAX_EVENTS = 1000  # that are kept; chosen
 
 
 class EventKind(StrEnum):
@@ -51,7 +51,7 @@ class EventLog:
     """The events of a sensor in their order; also lines of the logger ``cmpdesign.runtime``."""
 
     def __init__(self) -> None:
-        self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self._events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self._lock = Lock()
         self.count = 0
 

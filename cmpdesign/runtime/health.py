@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 FRAMES = 256  # over which times are counted; chosen
 RECENT = 16  # frames whose median is compared with the rest; chosen
-MOST_BLUR_RATIO = 1.5  # blurred by 1.5 times as much, the deviations of markers double; chosen
-LEAST_LIGHT, MOST_TINT = 0.7, 1.15  # of the light at rest, and of a channel over the mean of all; chosen
-MOST_DRIFT_PX = 0.5  # of the pattern at rest; chosen, ten times the deviation of a marker in poor light
+MAX_BLUR_RATIO = 1.5  # blurred by 1.5 times as much, the deviations of markers double; chosen
+MIN_LIGHT, MAX_TINT = 0.7, 1.15  # of the light at rest, and of a channel over the mean of all; chosen
+MAX_DRIFT_PX = 0.5  # of the pattern at rest; chosen, ten times the deviation of a marker in poor light
 
 
 @dataclass(frozen=True)
@@ -214,18 +214,18 @@ def _advice(
             f"clean the window: {found.share_read:.0%} of the markers at rest are measured, "
             f"{limits.min_share_read:.0%} are expected"
         )
-    if blur_ratio > MOST_BLUR_RATIO:
+    if blur_ratio > MAX_BLUR_RATIO:
         yield f"refocus: the blur is {blur_px:.1f} px, {blur_ratio:.1f} times that at rest"
-    if found.light < LEAST_LIGHT:
+    if found.light < MIN_LIGHT:
         yield f"check the light: the picture has {found.light:.0%} of its brightness at rest"
     tint = dict(zip(("blue", "green", "red"), found.tint, strict=True))
     name = max(tint, key=lambda one: tint[one])
-    if tint[name] > MOST_TINT:
+    if tint[name] > MAX_TINT:
         yield (
             f"check the light, or fix the white balance: {name} is {tint[name]:.2f} times as strong as at rest, "
             "against the mean of all colors"
         )
-    if found.drift_px > MOST_DRIFT_PX:
+    if found.drift_px > MAX_DRIFT_PX:
         yield f"zero the sensor: the untouched pattern has moved by {found.drift_px:.2f} px (RMS) since the rest frame"
     if found.dropped > 0.01:
         yield f"{found.dropped:.0%} of the frames have no result; ask for fewer frames a second, or fewer outputs"

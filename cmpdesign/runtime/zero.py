@@ -20,12 +20,10 @@ if TYPE_CHECKING:
     from extractor import Markers, Reference
 
 FRAMES = 8  # that are averaged; chosen
-MOST_MOTION = (
+MAX_MOTION = (
     3.0  # RMS of the markers about their means, in stated deviations, of a pattern that is still; chosen
 )
-MOST_BEND = (
-    4.0  # RMS of the way from the former rest frame beyond an affine map, in stated deviations; chosen
-)
+MAX_BEND = 4.0  # RMS of the way from the former rest frame beyond an affine map, in stated deviations; chosen
 FEWEST_SHARE = 0.5  # of the markers, that must be measured in all frames; chosen
 
 
@@ -72,10 +70,10 @@ def _mean(several: Sequence[Markers], name: str) -> Markers:
         )
     sigma_px = _sigma_px(several[-1].cov_px2[is_measured])
     motion_px = float(np.sqrt(np.var(xy_px[:, is_measured], axis=0, ddof=1).mean()))
-    if motion_px > MOST_MOTION * sigma_px:
+    if motion_px > MAX_MOTION * sigma_px:
         raise TouchedError(
             f"{name}: no rest frame: the markers move by {motion_px:.3f} px (RMS), at most "
-            f"{MOST_MOTION * sigma_px:.3f} px are still; hold the sensor still and touch nothing"
+            f"{MAX_MOTION * sigma_px:.3f} px are still; hold the sensor still and touch nothing"
         )
     cov_px2 = several[-1].cov_px2 / len(several)
     lost = ~np.isfinite(xy_px).all(axis=(0, 2))
@@ -125,7 +123,7 @@ def motion_of(
         float(np.sqrt(np.mean(one**2))) for one in (moved_px[known], drift_px, moved_px[known] - drift_px)
     )
     # the former rest frame has the noise of one frame, or less
-    by_noise_px = MOST_BEND * _sigma_px(markers.cov_px2[known]) * float(np.sqrt(FRAMES + 1))
+    by_noise_px = MAX_BEND * _sigma_px(markers.cov_px2[known]) * float(np.sqrt(FRAMES + 1))
     limit = by_noise_px if most_px is None else most_px
     return WayFromRest(way, float("nan") if bend > limit else drift, bend, limit)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cmpdesign.errors import InputError, OutputError
 from cmpdesign.files.atomic import staged_file
 from cmpdesign.files.npz import NpzError, read_npz
-from cmpdesign.inputs.files import MOST_DATA_BYTES
+from cmpdesign.inputs.files import MAX_DATA_BYTES
 from cmpdesign.scene.errors import SceneError
 
 
@@ -118,7 +118,7 @@ def load_truths(path: str | Path) -> tuple[list[Truth], NDArray[np.float64]]:
 
 def _load_npz(path: str | Path) -> dict[str, Any]:
     try:
-        return read_npz(path, most_bytes=MOST_DATA_BYTES)
+        return read_npz(path, most_bytes=MAX_DATA_BYTES)
     except InputError as error:
         raise SceneError(str(error)) from None
     except NpzError as error:

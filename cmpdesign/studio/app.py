@@ -29,7 +29,7 @@ from cmpdesign.studio.live import (
     open_camera,
     shown_image,
 )
-from cmpdesign.studio.readings import MOST_PICTURE_BYTES, Readings
+from cmpdesign.studio.readings import MAX_PICTURE_BYTES, Readings
 from cmpdesign.studio.recording import KINDS, Recordings
 from extractor import ExtractorError, Reference
 
@@ -41,7 +41,7 @@ with extra("studio"):
     from starlette.routing import Route, WebSocketRoute
     from starlette.websockets import WebSocket, WebSocketDisconnect
 
-MOST_TEXT_BYTES, MOST_LAYOUT_BYTES = 1 << 20, 64 << 20
+MAX_TEXT_BYTES, MAX_LAYOUT_BYTES = 1 << 20, 64 << 20
 PAGE = Path(__file__).parent / "page"
 _KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -213,13 +213,13 @@ class Studio:
         return _download(data, path.name)
 
     async def _layout(self, request: Request) -> Response:
-        text = (await _body(request, MOST_LAYOUT_BYTES)).decode("utf-8", "replace")
+        text = (await _body(request, MAX_LAYOUT_BYTES)).decode("utf-8", "replace")
         return JSONResponse(await run_in_threadpool(self.readings.add_layout, text))
 
     async def _read(self, request: Request) -> Response:
         query = request.query_params
         design = designs.design_of(parse_json(query.get("fields", "{}"), "the design"))
-        data = await _body(request, MOST_PICTURE_BYTES)
+        data = await _body(request, MAX_PICTURE_BYTES)
         name = query.get("name", "picture")[:100]
         read = partial(self.readings.read, design, query.get("layout", ""), name, data)
         return JSONResponse(await run_in_threadpool(read))
@@ -318,7 +318,7 @@ async def _cameras(request: Request) -> Response:
 
 
 async def _toml(request: Request) -> Response:
-    text = (await _body(request, MOST_TEXT_BYTES)).decode("utf-8", "replace")
+    text = (await _body(request, MAX_TEXT_BYTES)).decode("utf-8", "replace")
     return JSONResponse({"fields": await run_in_threadpool(designs.read_design_toml, text)})
 
 
@@ -330,7 +330,7 @@ async def _seen(request: Request) -> Response:
 
 async def _asked(request: Request) -> dict[str, Any]:
     """The JSON object of a request."""
-    document = parse_json((await _body(request, MOST_TEXT_BYTES)).decode("utf-8", "replace"), "the request")
+    document = parse_json((await _body(request, MAX_TEXT_BYTES)).decode("utf-8", "replace"), "the request")
     if not isinstance(document, dict):
         raise _Refused(422, "the request is no JSON object")
     return document

@@ -26,7 +26,7 @@ from cmpdesign.inputs.files import read_file, read_text
 from cmpdesign.products.registry import PREVIEW, REPORT, chosen_products
 from cmpdesign.studio.designs import fields_of
 
-MOST_RUNNING, MOST_KEPT = 2, 6
+MAX_RUNNING, MAX_KEPT = 2, 6
 _OLDEST_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 _DESIGN, _RESULT, _MADE = "design.toml", "result.json", "made"
 
@@ -137,8 +137,8 @@ class Builds:
             CmpDesignError: an unknown product, or too many builds run.
         """
         names = chosen_products(",".join(products))
-        if sum(build.state == "running" for build in self._builds.values()) >= MOST_RUNNING:
-            raise CmpDesignError(f"{MOST_RUNNING} builds run already, the limit; wait for one, or cancel it")
+        if sum(build.state == "running" for build in self._builds.values()) >= MAX_RUNNING:
+            raise CmpDesignError(f"{MAX_RUNNING} builds run already, the limit; wait for one, or cancel it")
         folder = Path(tempfile.mkdtemp(prefix="cmpdesign-studio-"))
         write_file(folder / _DESIGN, design_toml(fields_of(design)))
         words = [
@@ -164,7 +164,7 @@ class Builds:
         build = Build(secrets.token_hex(8), folder, names, process)
         Thread(target=build.follow, daemon=True).start()
         self._builds[build.key] = build
-        for old in [one for one in self._builds.values() if one.state != "running"][:-MOST_KEPT]:
+        for old in [one for one in self._builds.values() if one.state != "running"][:-MAX_KEPT]:
             self._builds.pop(old.key).cancel()
         return build
 

@@ -34,7 +34,7 @@ LIBRARIES = {
 _TABLES = ("palette", "fiducials", "laser", "mold", "sheet")
 _WORD = re.compile(r"[a-z_]+(?:\.[a-z_]+)?")
 _NOT_IN_FINDINGS = {"name", "description", "source", "extends"}
-MOST_CAMERA_PIXELS = 60_000_000
+MAX_CAMERA_PIXELS = 60_000_000
 _SIZE_FIELDS = ("pitch_mm", "layers", "width_mm", "height_mm")  # a finding on a size names one of them
 _STEPS = 64  # of a remedy, above and below the present value
 _STEP = 1.04  # ratio of such steps
@@ -53,14 +53,14 @@ class Look:
         """The values of a request; what is missing has its usual value.
 
         Raises:
-            DesignError: no camera of 10 px a side or more, and of at most ``MOST_CAMERA_PIXELS``.
+            DesignError: no camera of 10 px a side or more, and of at most ``MAX_CAMERA_PIXELS``.
         """
         match asked.get("camera", [640, 480]):
             case [int(width), int(height)] if (
-                min(width, height) >= 10 and width * height <= MOST_CAMERA_PIXELS
+                min(width, height) >= 10 and width * height <= MAX_CAMERA_PIXELS
             ):
                 return cls((width, height), asked.get("back") is True, str(asked.get("labels", "")))
-        most = MOST_CAMERA_PIXELS // 10**6
+        most = MAX_CAMERA_PIXELS // 10**6
         raise DesignError(f"camera: expected width and height, 10 px or more, and at most {most} megapixels")
 
 

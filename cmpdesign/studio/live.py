@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from extractor import Reference
     from extractor.contact import ContactForce
 
-MOST_CAMERA_PIXELS = 8_000_000  # of a frame of the browser's camera
+MAX_CAMERA_PIXELS = 8_000_000  # of a frame of the browser's camera
 JPEG_QUALITY = 80  # of a shown frame; the reader gets the frame itself
 WAIT_S = 1.0  # for a new frame, before the connection is looked at again
 _RATE_FRAMES = 30  # over which the rate is counted
@@ -188,7 +188,7 @@ class CameraReader:
         """
         now_s, image, problem = time.monotonic(), None, ""
         try:
-            image = decode_bytes(data, "the frame", MOST_CAMERA_PIXELS)
+            image = decode_bytes(data, "the frame", MAX_CAMERA_PIXELS)
         except CmpDesignError as error:
             problem = str(error)
         self._times.append(now_s)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.design import Coupon
     from extractor import Markers
 
-MOST_PIXELS = 60_000_000  # width x height, tested before a picture is decoded
+MAX_PIXELS = 60_000_000  # width x height, tested before a picture is decoded
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ class StudioReading:
     def report(self) -> bytes:
         """The bundle of a problem, as of ``verify --report``."""
         path = self.file.with_name("report.zip")
-        verify(self.verifier.reference, self.file, report=path, max_pixels=MOST_PIXELS)
+        verify(self.verifier.reference, self.file, report=path, max_pixels=MAX_PIXELS)
         return read_file(path)
 
 

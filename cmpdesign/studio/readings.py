@@ -20,7 +20,7 @@ from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import IMAGE_BITS, ImageFileError, read_image, to_jpeg
 from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.files import read_file
-from cmpdesign.studio.reading import MOST_PIXELS, StudioReading
+from cmpdesign.studio.reading import MAX_PIXELS, StudioReading
 from cmpdesign.studio.recording import KINDS
 from extractor import Reference
 from extractor.layout.layout_file import parse_layout
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from cmpdesign.api.designs import Design
     from cmpdesign.products.laser.coupon.design import Coupon
 
-MOST_PICTURE_BYTES = 64 << 20
-MOST_KEPT = 40  # pictures, as files
-MOST_LAYOUTS = 8
+MAX_PICTURE_BYTES = 64 << 20
+MAX_KEPT = 40  # pictures, as files
+MAX_LAYOUTS = 8
 JPEG_QUALITY = 92
 _PICTURE = "picture"
 
@@ -65,7 +65,7 @@ class Readings:
             layout = parse_layout(text)
             self._layouts[key] = layout
             about = f"{layout.pattern}, {int(layout.present.sum())} markers"
-        for old in list(self._layouts)[:-MOST_LAYOUTS]:
+        for old in list(self._layouts)[:-MAX_LAYOUTS]:
             del self._layouts[old]
         return {"key": key, "about": about}
 
@@ -111,7 +111,7 @@ class Readings:
             bare = replace(reading.markers, stages={})
             reading = replace(reading, verdict=replace(reading.verdict, markers=bare))
         self._readings[reading.key] = reading
-        for old in list(self._readings.values())[:-MOST_KEPT]:
+        for old in list(self._readings.values())[:-MAX_KEPT]:
             self._forget(old)
         return document
 
@@ -123,7 +123,7 @@ class Readings:
         """
         reading = self.get(key)
         if stage == _PICTURE:
-            pixels: NDArray[Any] | None = read_image(reading.file, MOST_PIXELS, gray=True)
+            pixels: NDArray[Any] | None = read_image(reading.file, MAX_PIXELS, gray=True)
         else:
             with self._drawing:
                 pixels = (self._stages[1] if self._stages[0] == key else self._draw(reading)).get(stage)
@@ -154,11 +154,11 @@ class Readings:
         """
         from cmpdesign.api.sequences import track
 
-        read = [self.get(key) for key in keys[: MOST_KEPT + 1]]
+        read = [self.get(key) for key in keys[: MAX_KEPT + 1]]
         if kind not in KINDS:
             raise CmpDesignError(f"{kind[:20]}: expected one of {', '.join(KINDS)}")
-        if not 0 < len(read) <= MOST_KEPT or len({one.verifier.reference.digest for one in read}) > 1:
-            raise CmpDesignError(f"choose 1 to {MOST_KEPT} pictures that were read with one layout")
+        if not 0 < len(read) <= MAX_KEPT or len({one.verifier.reference.digest for one in read}) > 1:
+            raise CmpDesignError(f"choose 1 to {MAX_KEPT} pictures that were read with one layout")
         with tempfile.TemporaryDirectory(prefix="cmpdesign-studio-") as folder:
             frames = Path(folder) / "frames"
             frames.mkdir()
@@ -167,7 +167,7 @@ class Readings:
             made = Path(folder) / f"run.{kind}"
             at_rest = None if rest is None else self.get(rest).file
             track(
-                read[0].verifier.reference, frames, made, rest=at_rest, side="either", max_pixels=MOST_PIXELS
+                read[0].verifier.reference, frames, made, rest=at_rest, side="either", max_pixels=MAX_PIXELS
             )
             return read_file(made)
 
@@ -188,7 +188,7 @@ class Readings:
     ) -> StudioReading:
         """The reading of a file; a picture without a marker may show a coupon."""
         if self._verifier is None or self._verifier.reference.digest != reference.digest:
-            self._verifier = Verifier(reference, max_pixels=MOST_PIXELS)
+            self._verifier = Verifier(reference, max_pixels=MAX_PIXELS)
         verifier, problem, verdict, size_px = self._verifier, None, None, (0, 0)
         try:
             image = verifier.read(file)
@@ -200,7 +200,7 @@ class Readings:
         from cmpdesign.studio.coupons import coupon_readings
 
         if verdict is None or (markers is not None and not markers.found):
-            for coupon, found, shown_px in coupon_readings(coupons(), file, MOST_PIXELS):
+            for coupon, found, shown_px in coupon_readings(coupons(), file, MAX_PIXELS):
                 return StudioReading(key, name, file, verifier, shown_px, found, coupon)
         if problem is not None:
             raise problem

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from cmpdesign.tracking.sinks.tables import FrameSink
 
 KINDS = ("npz", "csv", "parquet", "mcap")
-MOST_ROWS = 10_000_000  # frames x markers of one recording, about 700 MB before it is compressed
-MOST_KEPT = 3
+MAX_ROWS = 10_000_000  # frames x markers of one recording, about 700 MB before it is compressed
+MAX_KEPT = 3
 
 
 @dataclass(eq=False)
@@ -33,7 +33,7 @@ class Recordings:
         """Keep a file, whose folder is its own; the oldest is removed."""
         key = secrets.token_hex(8)
         self._files[key] = path
-        for old in list(self._files)[:-MOST_KEPT]:
+        for old in list(self._files)[:-MAX_KEPT]:
             shutil.rmtree(self._files.pop(old).parent, ignore_errors=True)
         return key
 
@@ -82,9 +82,9 @@ class Recorder:
             self._sink = open_sink(path, self._table())
 
     def add(self, frame: Any, image: Any = None) -> None:
-        """Take a frame, if a recording runs; it ends by itself at ``MOST_ROWS``."""
+        """Take a frame, if a recording runs; it ends by itself at ``MAX_ROWS``."""
         with self._lock:
-            if self._sink is not None and self._frames * len(frame.markers.status) < MOST_ROWS:
+            if self._sink is not None and self._frames * len(frame.markers.status) < MAX_ROWS:
                 self._sink.add(frame)
                 self._frames += 1
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from cmpdesign.studio.live import LiveFeed
 
 HOST, PORT = "127.0.0.1", 8300
-MOST_MESSAGE_BYTES = 8 << 20  # of a websocket: one frame of a camera
-MOST_CONNECTIONS = 64  # requests and websockets at once; a browser opens 6 requests a tab
+MAX_MESSAGE_BYTES = 8 << 20  # of a websocket: one frame of a camera
+MAX_CONNECTIONS = 64  # requests and websockets at once; a browser opens 6 requests a tab
 BROWSER_S = 0.3  # from the start to the browser's first request
 
 
@@ -56,9 +56,9 @@ def serve(
         log_level="error",
         access_log=False,
         server_header=False,
-        ws_max_size=MOST_MESSAGE_BYTES,
+        ws_max_size=MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # images are compressed already
-        limit_concurrency=MOST_CONNECTIONS,
+        limit_concurrency=MAX_CONNECTIONS,
         timeout_graceful_shutdown=3,
     )
     announce(door.address)

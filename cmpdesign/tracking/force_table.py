@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from extractor.contact import ContactForce, ContactReader
 
 Array = NDArray[np.float64]
-MOST_REGIONS = 8  # of a frame in the columns of regions, the largest force first
+MAX_REGIONS = 8  # of a frame in the columns of regions, the largest force first
 FORCE_DIGITS: Mapping[str, int] = (
     {"contact_reason": 0, "contact_regions": 0, "utilisation": 4}
     | {f"force_{axis}_n": 6 for axis in AXES}
@@ -59,12 +59,12 @@ def force_columns(found: Sequence[ContactForce]) -> Columns:
 
 
 def _region_columns(found: Sequence[ContactForce]) -> Columns:
-    """(F, MOST_REGIONS, ...) of every column of regions; NaN beyond a frame's last region."""
+    """(F, MAX_REGIONS, ...) of every column of regions; NaN beyond a frame's last region."""
     columns: Columns = {
-        name: np.full((len(found), MOST_REGIONS, *shape), np.nan) for name, shape in REGION_COLUMNS.items()
+        name: np.full((len(found), MAX_REGIONS, *shape), np.nan) for name, shape in REGION_COLUMNS.items()
     }
     for row, one in enumerate(found):
-        for place, region in enumerate(one.regions[:MOST_REGIONS]):
+        for place, region in enumerate(one.regions[:MAX_REGIONS]):
             for name, shape in REGION_COLUMNS.items():
                 value = np.asarray(getattr(region, name.removeprefix("region_")))
                 if value.ndim == 2:

@@ -21,7 +21,7 @@ Picture = NDArray[np.uint8]
 EMPTY_SIZE = (640, 480)  # (width, height) of the video when its first frame has no image, px
 WAY_BGR = (255, 200, 0)
 PRESSURE_BGR = (60, 60, 240)
-LEAST_PRESSURE = 0.05  # of the largest pressure, below which a marker has no disc
+MIN_PRESSURE = 0.05  # of the largest pressure, below which a marker has no disc
 FIXED_BITS = 4  # OpenCV draws with 4 fractional bits
 
 
@@ -127,7 +127,7 @@ def _draw_pressure(
     import cv2
 
     largest = float(np.nanmax(pressure_mpa, initial=0.0))
-    shown = np.isfinite(xy_px[:, 0]) & (pressure_mpa > LEAST_PRESSURE * largest)
+    shown = np.isfinite(xy_px[:, 0]) & (pressure_mpa > MIN_PRESSURE * largest)
     if not shown.any():
         return
     known = xy_px[np.isfinite(xy_px[:, 0])]

@@ -53,6 +53,6 @@ class CellMesh:
 
 def build_cell_mesh(cells: Cells) -> CellMesh:
     """Stage 6: the links of the cells."""
-    links, swelling = native.link_cells(cells.center_px, cells.corner_px)
-    center = cells.center_px[:, None]
-    return CellMesh(links, swelling, center + (cells.corner_px - center) / swelling)
+    links, swelling = native.link_cells(cells.centre_px, cells.corner_px)
+    centre = cells.centre_px[:, None]
+    return CellMesh(links, swelling, centre + (cells.corner_px - centre) / swelling)

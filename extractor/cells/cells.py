@@ -57,14 +57,14 @@ class Cells:
     """The regions of an image that may be colored cells.
 
     Attributes:
-        center_px: (N, 2) float64 in the image frame.
+        centre_px: (N, 2) float64 in the image frame.
         area_px: (N,) float64, px^2.
         corner_px: (N, 3, 2) float64, the corners of the triangle with the region's moments, clockwise in the image.
         quality: (N,) float64, how well the region is a triangle, at most 1.
         share: (N,) float64, the level of the region as a share of the local contrast.
     """
 
-    center_px: NDArray[np.float64]
+    centre_px: NDArray[np.float64]
     area_px: NDArray[np.float64]
     corner_px: NDArray[np.float64]
     quality: NDArray[np.float64]
@@ -98,7 +98,7 @@ def find_cells(
     if before is not None:
         known = replace(
             before,
-            center_px=view.to_level(before.center_px),
+            centre_px=view.to_level(before.centre_px),
             area_px=before.area_px / scale**2,
             corner_px=view.to_level(before.corner_px),
         )
@@ -106,7 +106,7 @@ def find_cells(
     found = native.find_candidates(image, effort.maps, effort.shares, known, tile_px)
     return replace(
         found,
-        center_px=view.to_full_scale(found.center_px),
+        centre_px=view.to_full_scale(found.centre_px),
         area_px=found.area_px * scale**2,
         corner_px=view.to_full_scale(found.corner_px),
     )

@@ -33,11 +33,11 @@ class Regions:
 def grow(view: PyramidLevel, cells: Cells) -> Regions:
     """Stage 4 (AGA): add 4-neighbours to each seed while eq. 3 is below a limit, with the mean updated after each wave.
 
-    The seeds are the cells' centers. Eq. 3 uses OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of
+    The seeds are the cells' centres. Eq. 3 uses OpenCV's 8-bit HSV (H 0..179, S and V 0..255). Differences and means of
     hue are circular; ``P . mean = 0`` (black) rejects the pixel instead of dividing.
     """
     height, width = view.image.shape[:2]
-    seed = np.clip(np.rint(view.to_level(cells.center_px)), 0, (width - 1, height - 1)).astype(np.int32)
+    seed = np.clip(np.rint(view.to_level(cells.centre_px)), 0, (width - 1, height - 1)).astype(np.int32)
     limit_px = np.maximum(MAX_GROWN_AREA * cells.area_px / view.scale**2, 1).astype(np.int64)
     hsv = cv2.cvtColor(view.image, cv2.COLOR_BGR2HSV)
     framed, moments = native.grow(np.asarray(hsv, np.uint8), seed, limit_px)

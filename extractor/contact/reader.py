@@ -75,7 +75,7 @@ ONE_VIEW = replace(MODEL, strain_factor=0.0)
 # One image tells less of the pressure than two: beyond the model's range a narrower prior would change the force.
 ONE_VIEW_LIMITS = replace(LIMITS, tau=0.5)
 SMOOTH_SPACINGS = 0.8  # width of the smoothed loads; chosen
-LEAST_SIGMAS = 3.0  # of the force, below which it is too little
+MIN_SIGMAS = 3.0  # of the force, below which it is too little
 
 
 class ContactReader:
@@ -284,7 +284,7 @@ class ContactReader:
         area = sum(patch.area_mm2 for patch in patches)
         if -whole.force[2] / (area * self.young_mpa) > self.model.largest_load:
             return ContactReason.BEYOND_STRAIN
-        if -whole.force[2] < LEAST_SIGMAS * np.sqrt(whole.force_cov[2, 2]):
+        if -whole.force[2] < MIN_SIGMAS * np.sqrt(whole.force_cov[2, 2]):
             return ContactReason.TOO_LITTLE_FORCE
         if (self._rim_mm[support] < self.model.rim_spacings * self.gel.spacing_mm).any():
             return ContactReason.AT_RIM

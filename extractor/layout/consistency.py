@@ -296,8 +296,8 @@ def _check_colors(reference: Pattern) -> None:
             fail("cells.color", f"{name} twice around marker {repeated[0]}", "at most one cell of a color")
         cell_of[corners, color] = cells[:, None]
     inner = np.flatnonzero((cell_of >= 0).all(axis=1))
-    centers = reference.xy_mm[reference.cell_corners].mean(axis=1)[cell_of[inner]]
-    wrong = inner[polygon_area(centers) >= 0]
+    centres = reference.xy_mm[reference.cell_corners].mean(axis=1)[cell_of[inner]]
+    wrong = inner[polygon_area(centres) >= 0]
     if len(wrong):
         fail("cells.color", f"counter-clockwise around marker {wrong[0]}", "red, green, blue clockwise")
 

@@ -34,7 +34,7 @@ INNER_MARKERS = 37  # whose covariances are compared with those of the outermost
 COUPLING_ROUNDS = (
     3  # of the couplings by their covariances: the third changes them by less than 0.1 %. Chosen
 )
-LEAST_SUM = 1e-6  # of a marker's block; derived: it only keeps a division from failing
+MIN_SUM = 1e-6  # of a marker's block; derived: it only keeps a division from failing
 SIDE_SUMS = (
     np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 )  # of products of straight lines along a gridline, by their ends
@@ -208,7 +208,7 @@ class _Neighbourhoods:
         """(R, 14, 14) the sums over the gridlines of pulls (R, 7, 6, 7) of members on members."""
         blocks = np.einsum("rmkn,rmkij->rminj", pulls, self._pulls, optimize=True)
         size = 2 * MEMBERS
-        return np.asarray(blocks.reshape(-1, size, size) + LEAST_SUM * np.eye(size))
+        return np.asarray(blocks.reshape(-1, size, size) + MIN_SUM * np.eye(size))
 
 
 def scatter_bending(

@@ -27,15 +27,15 @@ class LayoutCells(NamedTuple):
     """The layout's U colored cells, for compiled functions.
 
     Attributes:
-        center_mm: (U, 2) float64, layout frame.
+        centre_mm: (U, 2) float64, layout frame.
         ink: (U,) uint8, 1 red, 2 green, 3 blue.
         size_mm: (U,) float64, the mean side.
-        corner_vectors_mm: (U, 3, 2) float64, from the center to the corners.
+        corner_vectors_mm: (U, 3, 2) float64, from the centre to the corners.
         cell_neighbours: (U, 6) int32, the cells that share a corner with each cell, in the order of
             ``NEIGHBOUR_STEPS``; -1 for none.
     """
 
-    center_mm: NDArray[np.float64]
+    centre_mm: NDArray[np.float64]
     ink: NDArray[np.uint8]
     size_mm: NDArray[np.float64]
     corner_vectors_mm: NDArray[np.float64]
@@ -92,8 +92,8 @@ class Lattice:
     present: NDArray[np.bool_]
 
     @cached_property
-    def center_mm(self) -> NDArray[np.float64]:
-        """(U, 2) float64, the centers of the colored cells."""
+    def centre_mm(self) -> NDArray[np.float64]:
+        """(U, 2) float64, the centres of the colored cells."""
         return np.asarray(self.marker_mm[self.corner_ids].mean(axis=1))
 
     @cached_property
@@ -114,7 +114,7 @@ class Lattice:
     def layout_cells(self) -> LayoutCells:
         """The colored cells as a record for compiled functions."""
         return LayoutCells(
-            self.center_mm, self.ink, self.size_mm, self.corner_vectors_mm, self.cell_neighbours
+            self.centre_mm, self.ink, self.size_mm, self.corner_vectors_mm, self.cell_neighbours
         )
 
     @cached_property
@@ -136,8 +136,8 @@ class Lattice:
 
     @cached_property
     def corner_vectors_mm(self) -> NDArray[np.float64]:
-        """(U, 3, 2) float64, from the centers of the colored cells to their corners."""
-        return np.asarray(self.marker_mm[self.corner_ids] - self.center_mm[:, None])
+        """(U, 3, 2) float64, from the centres of the colored cells to their corners."""
+        return np.asarray(self.marker_mm[self.corner_ids] - self.centre_mm[:, None])
 
 
 def lattice_of(reference: Reference) -> Lattice:

@@ -216,7 +216,7 @@ def _palette(value: object) -> dict[str, str]:
 
 
 def _fiducials(document: dict[str, Any]) -> tuple[NDArray[np.float64], float]:
-    """(F, 2) float64 centers and the diameter of the registration marks, mm."""
+    """(F, 2) float64 centres and the diameter of the registration marks, mm."""
     if "fiducials" not in document:
         return np.empty((0, 2)), 0.0
     marks = fields.mapping(document["fiducials"], "fiducials")

@@ -9,7 +9,7 @@ from extractor._native import layout as native
 
 QUADRATIC_TERMS = 6  # of a quadratic map: 1, x, y, x^2, xy, y^2 in units of the local edge
 LINEAR_TERMS = 3  # of a linear map: 1, x, y
-LEAST_EIGENVALUE = 1e-7  # of the normal equations, a neighbour
+MIN_EIGENVALUE = 1e-7  # of the normal equations, a neighbour
 RING_STEPS = np.array(
     [[q, r] for q in range(-2, 3) for r in range(-2, 3) if abs(q + r) <= 2 and (q, r) != (0, 0)], np.int32
 )  # (18, 2) axial steps to the markers of the two rings
@@ -41,7 +41,7 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
     ):
         map_rows = rows[selected, :, :terms]
         gram = np.swapaxes(map_rows, 1, 2) @ map_rows
-        regular = np.linalg.eigvalsh(gram)[:, 0] > LEAST_EIGENVALUE * count[selected]
+        regular = np.linalg.eigvalsh(gram)[:, 0] > MIN_EIGENVALUE * count[selected]
         solutions = np.linalg.solve(gram[regular], np.swapaxes(map_rows[regular], 1, 2))[:, 0]
         weights[np.flatnonzero(selected)[regular]] = solutions
     return weights

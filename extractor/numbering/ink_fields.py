@@ -22,7 +22,7 @@ from extractor.result import Reason
 MAX_MISFIT_RATIO = 0.7
 # (2, 3, 3) the class that is each ink, for a view of the stated or of the other side, and for each naming
 CLASS_OF_INK = np.array([[(sign * (np.arange(3) - t)) % 3 for t in range(3)] for sign in (1, -1)])
-LEAST_PALETTE_SHARE = 0.02  # of the light of an ink in a channel; chosen
+MIN_PALETTE_SHARE = 0.02  # of the light of an ink in a channel; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Palette:
         inks = np.array(
             [[light[int(colors[ink][i : i + 2], 16)] for i in (5, 3, 1)] for ink in ("red", "green", "blue")]
         )
-        inks = np.maximum(inks, LEAST_PALETTE_SHARE * inks.max())
+        inks = np.maximum(inks, MIN_PALETTE_SHARE * inks.max())
         self._shares = inks / inks.sum(axis=0)  # (3, 3) of each ink in each channel
 
     def naming(self, shares: NDArray[np.float64], other_side: bool = False) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from extractor.numbering.lattice_walk import WalkedCells
 
 CORNER_STEPS = (
     np.array([[-1, -1], [2, -1], [-1, 2]]) / 3.0
-)  # from the center of an up-cell, in steps of the lattice
+)  # from the centre of an up-cell, in steps of the lattice
 LATTICE_STEPS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])  # of q and r, in edges
 TURNS = 3
 NO_MOTION = np.zeros(3, np.int32)
@@ -47,7 +47,7 @@ def plane_of(layers: int) -> Plane:
     axial = np.ascontiguousarray(axial[np.abs(axial.sum(axis=1)) <= layers])
     lookup, places = cell_lookup_table(axial, layers), axial[:, None] + NEIGHBOUR_STEPS
     cells = LayoutCells(
-        center_mm=(axial + 1.0 / 3.0) @ LATTICE_STEPS,
+        centre_mm=(axial + 1.0 / 3.0) @ LATTICE_STEPS,
         ink=((axial[:, 0] - axial[:, 1]) % 3 + 1).astype(np.uint8),
         size_mm=np.ones(len(axial)),
         corner_vectors_mm=np.tile(CORNER_STEPS @ LATTICE_STEPS, (len(axial), 1, 1)),

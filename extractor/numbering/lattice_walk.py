@@ -46,14 +46,14 @@ class WalkedCells(NamedTuple):
     """Walked cells as native loops take them; a pattern's sides differ in the order of corners and coordinates.
 
     Attributes:
-        center_px: (N, 2) float64.
+        centre_px: (N, 2) float64.
         corner_px: (N, 3, 2) float64 without swelling, counter-clockwise as seen from the pattern's front.
         axial: (N, 2) int32.
         first: (N,) int8, the corner that is corner 0.
         part: (N,) int32, or -1.
     """
 
-    center_px: NDArray[np.float64]
+    centre_px: NDArray[np.float64]
     corner_px: NDArray[np.float64]
     axial: NDArray[np.int32]
     first: NDArray[np.int8]
@@ -67,7 +67,7 @@ def cell_light(view: PyramidLevel, cells: Cells, mesh: CellMesh) -> NDArray[np.f
         view: the image at the scale of recognition.
         cells, mesh: the cells and their links.
     """
-    return native.cell_light(view, cells.center_px, mesh.corner_px)
+    return native.cell_light(view, cells.centre_px, mesh.corner_px)
 
 
 def walk_cells(mesh: CellMesh, light: NDArray[np.float64]) -> Walk:
@@ -77,8 +77,8 @@ def walk_cells(mesh: CellMesh, light: NDArray[np.float64]) -> Walk:
 
 def seen_from(cells: Cells, mesh: CellMesh, walk: Walk, mirrored: bool) -> WalkedCells:
     """The walked cells of a pattern that is seen from its back (``mirrored``) or from its front."""
-    center, corner = cells.center_px, mesh.corner_px
+    centre, corner = cells.centre_px, mesh.corner_px
     if mirrored:
-        return WalkedCells(center, corner, walk.axial, walk.first, walk.part)
+        return WalkedCells(centre, corner, walk.axial, walk.first, walk.part)
     axial, corner = np.ascontiguousarray(walk.axial[:, ::-1]), np.ascontiguousarray(corner[:, ::-1])
-    return WalkedCells(center, corner, axial, (2 - walk.first).astype(np.int8), walk.part)
+    return WalkedCells(centre, corner, axial, (2 - walk.first).astype(np.int8), walk.part)

@@ -16,14 +16,14 @@ class NumberedTriangles(NamedTuple):
     """Numbered cells with the triangles from which their edges are measured.
 
     Attributes:
-        center_px: (N, 2) float64.
+        centre_px: (N, 2) float64.
         corner_px: (N, 3, 2) float64, clockwise in the image; NaN where no triangle is measured.
         cell: (N,) int32, the layout's cell.
         mirrored: the pattern is seen from its back.
         found: the number of cells that were found; those behind are predicted.
     """
 
-    center_px: NDArray[np.float64]
+    centre_px: NDArray[np.float64]
     corner_px: NDArray[np.float64]
     cell: NDArray[np.int32]
     mirrored: bool
@@ -36,7 +36,7 @@ class NumberedTriangles(NamedTuple):
         if kept.all():
             return self._replace(corner_px=corner_px)
         return NumberedTriangles(
-            self.center_px[kept], corner_px[kept], self.cell[kept], self.mirrored, self.found
+            self.centre_px[kept], corner_px[kept], self.cell[kept], self.mirrored, self.found
         )
 
 
@@ -52,12 +52,12 @@ def with_missing_cells(
     """
     known = np.flatnonzero(numbering.cell >= 0)
     corners, cell = corner_px[known], numbering.cell[known]
-    center = _centers(corners)
-    found, predicted = native.missing_cells(center, cell, lattice.layout_cells)
+    centre = _centres(corners)
+    found, predicted = native.missing_cells(centre, cell, lattice.layout_cells)
     if not numbering.mirrored:  # the layout's order is clockwise in images of the back
         predicted = predicted[:, ::-1]
     return NumberedTriangles(
-        np.concatenate([center, _centers(predicted)]),
+        np.concatenate([centre, _centres(predicted)]),
         np.concatenate([corners, predicted]),
         np.concatenate([cell, found]),
         numbering.mirrored,
@@ -65,6 +65,6 @@ def with_missing_cells(
     )
 
 
-def _centers(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 2) the centers of triangles (N, 3, 2); ``mean`` takes five times as long."""
+def _centres(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 2) the centres of triangles (N, 3, 2); ``mean`` takes five times as long."""
     return (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0

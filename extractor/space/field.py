@@ -73,7 +73,7 @@ class Field:
         return type(self), (self._layout,)
 
     @cached_property
-    def _centers_mm(self) -> Array:
+    def _centres_mm(self) -> Array:
         return np.asarray(self.xy_mm[self.triangles].mean(axis=1))
 
     def gradients(self, values: Array) -> Array:
@@ -139,7 +139,7 @@ class Field:
     def find(self, xy_mm: Array) -> tuple[NDArray[np.intp], Array]:
         """(N,) the triangle that contains each point (N, 2) of the layout, -1 for none; (N, 3) barycentric."""
         count = min(CANDIDATES, len(self.triangles))
-        candidates = nearest_points(self._centers_mm, xy_mm, count)
+        candidates = nearest_points(self._centres_mm, xy_mm, count)
         triangle, inside = np.full(len(xy_mm), -1, np.intp), np.full((len(xy_mm), 3), np.nan)
         for k in range(count):
             open_points = np.flatnonzero(triangle < 0)

@@ -174,11 +174,11 @@ def _planar_pose_candidates(xyz: Array, normalised: Array, mirrored: bool) -> li
     if h[2] @ [middle[0], middle[1], 1.0] < 0:
         h = -h
     first = _nearest_rotation(h[:, 0], h[:, 1])
-    center = first @ middle + h[:, 2]
-    sight = center / np.linalg.norm(center)
+    centre = first @ middle + h[:, 2]
+    sight = centre / np.linalg.norm(centre)
     columns = first[:, :2] - 2 * np.outer(sight, sight @ first[:, :2])
     second = _nearest_rotation(columns[:, 0], columns[:, 1])
-    return [(flip @ rotation, flip @ (center - rotation @ middle)) for rotation in (first, second)]
+    return [(flip @ rotation, flip @ (centre - rotation @ middle)) for rotation in (first, second)]
 
 
 def _nearest_rotation(first: Array, second: Array) -> Array:

@@ -74,7 +74,7 @@ def select_prediction(
     """
     best, best_share = None, MIN_PREDICTED
     for candidate in candidates:
-        cells = native.count_matching_centers(
+        cells = native.count_matching_centres(
             np.ascontiguousarray(image), candidate, tables, levels_before[0]
         )
         if cells.matching > best_share * cells.visible:

@@ -102,12 +102,12 @@ def _completion_tables(reference: Reference) -> CompletionTables:
     return CompletionTables(rows, np.column_stack([1 - weight_b - weight_c, weight_b, weight_c]), across)
 
 
-def _nearest_by_ink(center_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> NDArray[np.int32]:
+def _nearest_by_ink(centre_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> NDArray[np.int32]:
     """(C, 3) int32, the nearest red, green and blue cell of each of C cells."""
     nearest = np.empty((len(ink), 3), np.int32)
     for color in range(3):
         members = np.flatnonzero(ink == color + 1)
-        nearest[:, color] = members[nearest_points(center_mm[members], center_mm)[:, 0]]
+        nearest[:, color] = members[nearest_points(centre_mm[members], centre_mm)[:, 0]]
     return nearest
 
 

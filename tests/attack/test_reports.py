@@ -94,7 +94,7 @@ def test_sizes_are_counted_and_not_believed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stated: int
 ) -> None:
     """Whatever size the directory of the bundle states: a member of 3 MiB is too large where the limit is 2 MiB."""
-    monkeypatch.setattr(adopt_report, "MOST_BYTES", 2 << 20)
+    monkeypatch.setattr(adopt_report, "MAX_BYTES", 2 << 20)
     report = write_report(tmp_path / "r.zip", document("pictures/a.png"), {"pictures/a.png": bytes(3 << 20)})
     data = bytearray(report.read_bytes())
     entry = data.rindex(b"pictures/a.png") - 46

@@ -13,13 +13,13 @@ import pytest
 
 from benchmarks.ablation.__main__ import comparison_line, main, try_rules
 from benchmarks.ablation.report import merged_rows
-from benchmarks.suites.ablation.comparison import LEAST_LOSS, compare
+from benchmarks.suites.ablation.comparison import MIN_LOSS, compare
 from benchmarks.suites.ablation.pictures import PatternTruth, keep_pictures, pattern_truth, sampled_cases
 from benchmarks.suites.ablation.provoking import CHANGES, FOREIGN, provoking_cases
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.rules import RULES
 from benchmarks.suites.ablation.trial import PictureScore, read_without, score_reading
-from benchmarks.suites.ablation.worker import Reading
+from benchmarks.suites.ablation.worker import ReadPicture
 from benchmarks.suites.code_copy import ROOT, CodeCopy, Replacement, replaced_text
 from cmpdesign.scene import standard_layout
 from extractor import Status
@@ -127,7 +127,7 @@ def test_rules_in_cpp_compile_and_are_switched_off_and_on_again(copy: CodeCopy, 
 def test_a_rule_stays_if_lost_wrong_or_rms_rise_by_the_least_loss_in_most_pictures() -> None:
     full = [score(lost=100) for _ in range(40)]
     rule = rule_of("accuracy")
-    just, below = 100 * (1 + LEAST_LOSS), 100 * (1 + 0.9 * LEAST_LOSS)
+    just, below = 100 * (1 + MIN_LOSS), 100 * (1 + 0.9 * MIN_LOSS)
     assert compare(rule, full, [score(lost=just) for _ in full]).verdict == "keep"
     assert compare(rule, full, [score(lost=below) for _ in full]).verdict == "goes"
     assert compare(rule, full, [score(lost=90) for _ in full]).verdict == "goes"
@@ -182,7 +182,7 @@ def test_wrong_ids_and_wrong_positions_are_counted_apart() -> None:
     xy[5], xy[9] = true_px[6] + 1, true_px[9] + [0, 11]
     xy[20], status[20], status[30] = np.nan, Status.LOST, Status.REPAIRED
     cov = np.broadcast_to(0.05**2 * np.eye(2), (len(xy), 2, 2))
-    found = score_reading(Reading(xy, cov, status, 1.0), [truth])
+    found = score_reading(ReadPicture(xy, cov, status, 1.0), [truth])
     assert (found.wrong_ids, found.wrong_positions, found.lost) == (1, 1, 1)
     assert found.measured == len(xy) - 4
     assert found.squared_px2 == pytest.approx(0.05**2 * found.measured)
@@ -196,7 +196,7 @@ def test_the_pattern_that_was_read_is_the_one_with_fewest_wrong_markers() -> Non
         pattern_truth(layout, x + 20 * layout.marker_xy_mm, seen, (480, 640, 3)) for x in (100, 400)
     )
     cov = np.broadcast_to(np.eye(2), (len(seen), 2, 2))
-    reading = Reading(right.xy_px, cov, np.full(len(seen), Status.MEASURED), 1.0)
+    reading = ReadPicture(right.xy_px, cov, np.full(len(seen), Status.MEASURED), 1.0)
     assert score_reading(reading, [left, right]).wrong == 0
     assert score_reading(reading, [left]).wrong == len(seen)
     assert score_reading(reading, ()).wrong_ids == len(seen)

@@ -27,7 +27,7 @@ from benchmarks.suites.views.motions import fitting_motions
 from benchmarks.suites.views.views import (
     CROPS,
     DAMAGED,
-    View,
+    DrawnView,
     colored_cells,
     read_view,
     seen_cells,
@@ -116,13 +116,13 @@ def test_seen_cells_are_clear_of_covers_and_in_the_picture() -> None:
 
 @pytest.mark.parametrize("kind", [CROPS, DAMAGED])
 def test_a_view_without_the_white_cell_has_no_wrong_id(kind: str) -> None:
-    results = [read_view(View(kind, 1, number)) for number in range(3)]
+    results = [read_view(DrawnView(kind, 1, number)) for number in range(3)]
     assert not any(result.wrong_ids for result in results)
     assert all(result.motions >= 1 and result.cells for result in results)
-    assert results == [read_view(View(kind, 1, number)) for number in range(3)]
+    assert results == [read_view(DrawnView(kind, 1, number)) for number in range(3)]
 
 
 @pytest.mark.parametrize("number", [198, 257])
 def test_parts_that_find_no_place_do_not_outvote_the_right_motion(number: int) -> None:
     """Under the right motion of the largest part, the others found no place, and under a wrong one they did."""
-    assert read_view(View(DAMAGED, 990271, number, pitch_px=(24.0, 76.0))).wrong_ids == 0
+    assert read_view(DrawnView(DAMAGED, 990271, number, pitch_px=(24.0, 76.0))).wrong_ids == 0

@@ -34,8 +34,8 @@ from typer.testing import CliRunner
 
 from cmpdesign import demo
 from cmpdesign.cli import app
-from cmpdesign.cli.terminal import MOST_LINE_LETTERS
-from cmpdesign.contact.objects.heightmap import MOST_HEIGHTS
+from cmpdesign.cli.terminal import MAX_LINE_LETTERS
+from cmpdesign.contact.objects.heightmap import MAX_HEIGHTS
 from cmpdesign.design.design import Design
 from cmpdesign.design.templates import templates
 from cmpdesign.inputs import documents
@@ -235,12 +235,12 @@ def test_every_named_test_exists(name: str) -> None:
 def test_stated_limits_hold() -> None:
     page = (ROOT / "docs" / "reference" / "reliability.md").read_text(encoding="utf-8")
     for text, limit in (
-        ("16 MiB", inputs.MOST_TEXT_BYTES == 16 << 20),
-        ("250 megapixels", inputs.MOST_PIXELS == 250_000_000),
-        ("40 levels, numbers of 300 digits", (documents.MOST_LEVELS, documents.MOST_DIGITS) == (40, 300)),
-        ("100; 1000 characters", (lines.MOST_NAME_LETTERS, lines.MOST_LINE_LETTERS) == (100, 1000)),
-        ("at most 1000 characters", MOST_LINE_LETTERS == 1000),
-        ("25,000,000 heights", MOST_HEIGHTS == 25_000_000),
+        ("16 MiB", inputs.MAX_TEXT_BYTES == 16 << 20),
+        ("250 megapixels", inputs.MAX_PIXELS == 250_000_000),
+        ("40 levels, numbers of 300 digits", (documents.MAX_LEVELS, documents.MAX_DIGITS) == (40, 300)),
+        ("100; 1000 characters", (lines.MAX_NAME_LETTERS, lines.MAX_LINE_LETTERS) == (100, 1000)),
+        ("at most 1000 characters", MAX_LINE_LETTERS == 1000),
+        ("25,000,000 heights", MAX_HEIGHTS == 25_000_000),
     ):
         assert limit and text in page, text
 

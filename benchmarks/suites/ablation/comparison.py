@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from benchmarks.suites.ablation.rule import Rule
 from benchmarks.suites.ablation.trial import PictureScore
 
-LEAST_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that is kept
+MIN_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that is kept
 RESAMPLES, SEED = 2000, 20250101
 INTERVAL_PERCENT = (2.5, 97.5)
 Verdict = Literal["keep", "goes"]
@@ -40,8 +40,8 @@ class Change(NamedTuple):
 
     @property
     def is_worse(self) -> bool:
-        """Larger without the rule by ``LEAST_LOSS`` or more, with an interval above zero."""
-        return self.low > 0 and self.difference >= LEAST_LOSS * self.full
+        """Larger without the rule by ``MIN_LOSS`` or more, with an interval above zero."""
+        return self.low > 0 and self.difference >= MIN_LOSS * self.full
 
 
 class Comparison(NamedTuple):

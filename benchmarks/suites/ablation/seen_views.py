@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.photoreal.pictures import NO_PATTERN, PICTURES_FOLDER, TracedPicture, load_pictures
-from benchmarks.suites.views.views import DAMAGED, View, shoot_view
+from benchmarks.suites.views.views import DAMAGED, DrawnView, shoot_view
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class SeenPicture:
 def view_cases(seed: int) -> Iterator[CalibrationCase]:
     """Damaged crops without the white cell; of each the seen cells fit one motion only."""
     for number in count():
-        shot = shoot_view(View(DAMAGED, seed, number))
+        shot = shoot_view(DrawnView(DAMAGED, seed, number))
         if shot.motions == 1:
             picture = shot.picture
             seen = SeenPicture(picture.image, (VisibleMarkers(picture.marker_xy_px, picture.visible),))

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
 from benchmarks.suites.ablation.rule import Rule
-from benchmarks.suites.ablation.worker import Reading
+from benchmarks.suites.ablation.worker import ReadPicture
 from benchmarks.suites.code_copy import CodeCopy, Replacement, environment
 from benchmarks.suites.scoring.calibration import BEYOND_D2, squared_distances
 from extractor import Status
@@ -79,7 +79,7 @@ def read_without(
 
 def read_changed(
     changes: Iterable[Replacement], pictures: Sequence[Path], preset: str, copy: CodeCopy
-) -> list[Reading]:
+) -> list[ReadPicture]:
     """What the copy of the reader finds in the pictures when its texts are changed.
 
     Raises:
@@ -102,10 +102,10 @@ def read_changed(
         )
     if result.returncode != 0:
         raise RuntimeError(result.stderr[-2000:])
-    return [Reading(*entry) for entry in pickle.loads(out.read_bytes())]
+    return [ReadPicture(*entry) for entry in pickle.loads(out.read_bytes())]
 
 
-def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureScore:
+def score_reading(reading: ReadPicture, truths: Sequence[PatternTruth]) -> PictureScore:
     """The score of a reading against the nearest pattern in the picture."""
     reported = reading.status != Status.LOST
     if not truths:
@@ -114,7 +114,7 @@ def score_reading(reading: Reading, truths: Sequence[PatternTruth]) -> PictureSc
     return min(scores, key=lambda score: (score.wrong, score.lost))
 
 
-def _score_pattern(reading: Reading, truth: PatternTruth) -> PictureScore:
+def _score_pattern(reading: ReadPicture, truth: PatternTruth) -> PictureScore:
     reported = reading.status != Status.LOST
     error_px = np.linalg.norm(reading.xy_px - truth.xy_px, axis=1)
     wrong = reported & ~(error_px <= WRONG_POSITION * truth.edge_px)

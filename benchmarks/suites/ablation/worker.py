@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Reading(NamedTuple):
+class ReadPicture(NamedTuple):
     """The reading of one picture.
 
     Attributes:
@@ -37,7 +37,7 @@ class Reading(NamedTuple):
 
 
 def main(folder: str, preset: str, out: str, *pictures: str) -> None:
-    """Read the pictures, and write a list of ``Reading`` to the file ``out``."""
+    """Read the pictures, and write a list of ``ReadPicture`` to the file ``out``."""
     sys.path.insert(0, folder)
     import cv2
 
@@ -61,10 +61,10 @@ def main(folder: str, preset: str, out: str, *pictures: str) -> None:
         except Exception as error:
             count = len(own.layout.layer)
             xy_px, cov_px2 = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
-            readings.append(Reading(xy_px, cov_px2, np.zeros(count, np.uint8), float("nan"), repr(error)))
+            readings.append(ReadPicture(xy_px, cov_px2, np.zeros(count, np.uint8), float("nan"), repr(error)))
             continue
         ms = 1e3 * (time.process_time() - started)
-        readings.append(Reading(markers.xy_px, markers.cov_px2, np.asarray(markers.status), ms))
+        readings.append(ReadPicture(markers.xy_px, markers.cov_px2, np.asarray(markers.status), ms))
     Path(out).write_bytes(pickle.dumps([tuple(reading) for reading in readings]))
 
 

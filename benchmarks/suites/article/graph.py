@@ -58,8 +58,8 @@ def _candidate_pairs(corner_px: NDArray[np.float64], ink: NDArray[np.uint8]) -> 
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     i, j = pairs.T
     distance, limit = np.hypot(*(flat[i] - flat[j]).T), np.minimum(reach[i], reach[j])
-    center, common = corner_px.mean(axis=1), 0.5 * (flat[i] + flat[j])
-    to_i, to_j = center[i // 3] - common, center[j // 3] - common
+    centre, common = corner_px.mean(axis=1), 0.5 * (flat[i] + flat[j])
+    to_i, to_j = centre[i // 3] - common, centre[j // 3] - common
     same_side = (to_i * to_j).sum(axis=1) > MAX_SAME_SIDE_COSINE * np.hypot(*to_i.T) * np.hypot(*to_j.T)
     kept = (ink[i // 3] != ink[j // 3]) & (distance <= limit) & ~same_side
     return CornerPairs(pairs[kept], distance[kept] / limit[kept])

@@ -115,11 +115,11 @@ class Gaps(NamedTuple):
 
     Attributes:
         ratio: (N, 3) float64, the gap's brightness over that of the neighbouring inks, 0 where unknown.
-        center_px: (N, 3, 2) float64, NaN where unknown.
+        centre_px: (N, 3, 2) float64, NaN where unknown.
     """
 
     ratio: NDArray[np.float64]
-    center_px: NDArray[np.float64]
+    centre_px: NDArray[np.float64]
 
 
 def _measure_gaps(
@@ -135,14 +135,14 @@ def _measure_gaps(
     for n, ink in np.argwhere((corner_of_node >= 0) & (np.roll(corner_of_node, -1, axis=1) >= 0)):
         (ta, ka), (tb, kb) = divmod(corner_of_node[n, ink], 3), divmod(corner_of_node[n, (ink + 1) % 3], 3)
         before, after = corner_px[ta, (ka - sense) % 3], corner_px[tb, (kb + sense) % 3]
-        center = (corner_px[ta, ka] + corner_px[tb, kb]) / 6 + (before + after) / 3
-        radius = 0.2 * np.hypot(*(before - center))
+        centre = (corner_px[ta, ka] + corner_px[tb, kb]) / 6 + (before + after) / 3
+        radius = 0.2 * np.hypot(*(before - centre))
         gap, first, second = (
-            _patch_level(image, place, radius) for place in (center, middle[ta], middle[tb])
+            _patch_level(image, place, radius) for place in (centre, middle[ta], middle[tb])
         )
         if np.isfinite(gap + first + second):
             found.ratio[n, ink] = 2.0 * gap / max(first + second, 1.0)
-            found.center_px[n, ink] = center
+            found.centre_px[n, ink] = centre
     return found
 
 

@@ -37,18 +37,18 @@ def grow_from_hues(view: PyramidLevel, palette: dict[str, str]) -> InkRegions:
     label = _ink_of_pixels(view.image, palette)
     seeds, areas, inks = [], [], []
     for ink in (1, 2, 3):
-        _, _, stats, centers = cv2.connectedComponentsWithStats(
+        _, _, stats, centres = cv2.connectedComponentsWithStats(
             (label == ink).astype(np.uint8), connectivity=4
         )
-        for area, (x, y) in zip(stats[1:, cv2.CC_STAT_AREA].tolist(), centers[1:], strict=True):
+        for area, (x, y) in zip(stats[1:, cv2.CC_STAT_AREA].tolist(), centres[1:], strict=True):
             if area >= MIN_SEED_AREA_PX and label[round(y), round(x)] == ink:
                 seeds.append((x, y))
                 areas.append(float(area))
                 inks.append(ink)
     count = len(seeds)
-    center = np.array(seeds, np.float64).reshape(count, 2)
+    centre = np.array(seeds, np.float64).reshape(count, 2)
     none = np.zeros(count)
-    regions = grow(view, Cells(center, np.array(areas), np.zeros((count, 3, 2)), none, none))
+    regions = grow(view, Cells(centre, np.array(areas), np.zeros((count, 3, 2)), none, none))
     is_leak = np.concatenate([[True], regions.moments[:, 0] == 0])
     region_map = np.where(is_leak[regions.region_map], 0, regions.region_map)
     return InkRegions(region_map, np.array(inks, np.uint8))

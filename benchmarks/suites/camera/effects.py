@@ -19,7 +19,7 @@ Rng = np.random.Generator
 Effect = Callable[[Chain, float, Rng], Chain]
 
 NEUTRAL_K, WARMEST_K, COLDEST_K = 6500.0, 2500.0, 15000.0
-LEAST_EXPOSURE, MOST_EXPOSURE = 0.1, 8.0
+MIN_EXPOSURE, MAX_EXPOSURE = 0.1, 8.0
 BEST_QUALITY, WORST_QUALITY, FIRST_STRENGTH = 95, 15, 0.25  # of JPEG; the best quality up to this strength
 SURROUNDS: tuple[tuple[SurroundKind, RGB], ...] = (
     ("plain", (0.85, 0.85, 0.83)),
@@ -29,7 +29,7 @@ SURROUNDS: tuple[tuple[SurroundKind, RGB], ...] = (
     ("skin", (0.52, 0.29, 0.20)),
 )
 WEAKEST_CHANNEL, WEAK_CHANNELS = 0.05, 0.2  # of the light of the strongest channel
-MOST_LIFTED = 0.22  # of the largest light
+MAX_LIFTED = 0.22  # of the largest light
 SHARP_BLUR_PX, SOFT_BLUR_PX = 0.5, 1.1  # of the lens before a mosaic: a sharp one shows false colors
 
 
@@ -189,7 +189,7 @@ def move(chain: Chain, strength: float, rng: Rng) -> Chain:
 
 def change_exposure(chain: Chain, strength: float, rng: Rng) -> Chain:
     """0.1 to 8 times the light that just fits."""
-    extreme = float(rng.choice((LEAST_EXPOSURE, MOST_EXPOSURE)))
+    extreme = float(rng.choice((MIN_EXPOSURE, MAX_EXPOSURE)))
     return replace(chain, sensor=replace(chain.sensor, exposure=extreme**strength))
 
 
@@ -214,7 +214,7 @@ def add_noise(chain: Chain, strength: float, rng: Rng) -> Chain:
 
 def lift_black(chain: Chain, strength: float, rng: Rng) -> Chain:
     """Black lifted by up to 0.22 of the largest light: to 130 of 255."""
-    return replace(chain, sensor=replace(chain.sensor, lifted_black=MOST_LIFTED * strength))
+    return replace(chain, sensor=replace(chain.sensor, lifted_black=MAX_LIFTED * strength))
 
 
 def misbalance(chain: Chain, strength: float, rng: Rng) -> Chain:

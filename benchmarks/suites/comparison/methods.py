@@ -40,7 +40,7 @@ MEASURING_STAGES = ("refine", "repair")  # the stages after the 7th
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class FoundPoints:
     """The points of a method in one image.
 
     Attributes:
@@ -68,7 +68,7 @@ class Method:
     name: str
     board: bool
     numbered: bool
-    read: Callable[[SceneCase, Image], Reading]
+    read: Callable[[SceneCase, Image], FoundPoints]
 
 
 @cache
@@ -83,36 +83,36 @@ def method_extractor(case: SceneCase, preset: Preset, points: bool = True) -> Ex
 def extractor_method(preset: Preset, points: bool = True) -> Method:
     """A preset; without virtual markers (``points``) the extractor measures the same points as other detectors."""
 
-    def read(case: SceneCase, image: Image) -> Reading:
+    def read(case: SceneCase, image: Image) -> FoundPoints:
         reader = method_extractor(case, preset, points)
         started = time.process_time()
         found = reader.extract(image)
-        return Reading(found.xy_px, _elapsed_ms(started), found.cov_px2)
+        return FoundPoints(found.xy_px, _elapsed_ms(started), found.cov_px2)
 
     return Method(f"cmpdesign, {preset}" + ("" if points else ", markers only"), False, True, read)
 
 
-def read_numbered_corners(case: SceneCase, image: Image) -> Reading:
+def read_numbered_corners(case: SceneCase, image: Image) -> FoundPoints:
     """Stages 1 to 7: corners fitted to the edges of each triangle separately, and merged."""
     reader = method_extractor(case, "balanced")
     started = time.process_time()
     markers = reader.extract(image)
     ms, stages_ms = _elapsed_ms(started), markers.timings_ms
     measuring = sum(stages_ms[stage] for stage in MEASURING_STAGES) / sum(stages_ms.values())
-    return Reading(markers.stages["place"].xy_px, ms * (1 - measuring))
+    return FoundPoints(markers.stages["place"].xy_px, ms * (1 - measuring))
 
 
-def read_subpix_by_id(case: SceneCase, image: Image) -> Reading:
+def read_subpix_by_id(case: SceneCase, image: Image) -> FoundPoints:
     """Stages 1 to 7, then OpenCV's cornerSubPix on the gray image."""
     coarse = read_numbered_corners(case, image)
     started = time.process_time()
     points = coarse.points.copy()
     found = np.flatnonzero(np.isfinite(points[:, 0]))
     points[found] = _refine_sub_pixel(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), points[found])
-    return Reading(points, coarse.ms + _elapsed_ms(started))
+    return FoundPoints(points, coarse.ms + _elapsed_ms(started))
 
 
-def read_by_article(case: SceneCase, image: Image) -> Reading:
+def read_by_article(case: SceneCase, image: Image) -> FoundPoints:
     """The article's method: regions by AGA, triangles fitted to contours, merged and averaged corners, SSA."""
     layout, reader = cached_reference(case.pattern, case.layers), method_extractor(case, "balanced")
     lattice = make_lattice_tables(layout)
@@ -129,27 +129,27 @@ def read_by_article(case: SceneCase, image: Image) -> Reading:
         count = np.bincount(ids[ids >= 0], minlength=len(points))
         sums = [np.bincount(ids[ids >= 0], corner[:, axis], len(points)) for axis in (0, 1)]
         points[count > 0] = np.stack(sums, axis=1)[count > 0] / count[count > 0, None]
-    return Reading(points, _elapsed_ms(started))
+    return FoundPoints(points, _elapsed_ms(started))
 
 
-def read_chessboard_sb(case: SceneCase, image: Image) -> Reading:
+def read_chessboard_sb(case: SceneCase, image: Image) -> FoundPoints:
     """OpenCV's findChessboardCornersSB."""
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     started = time.process_time()
     _, corners = cv2.findChessboardCornersSB(gray, INNER_CORNERS, None, SB_FLAGS)
-    return Reading(_as_points(corners), _elapsed_ms(started))
+    return FoundPoints(_as_points(corners), _elapsed_ms(started))
 
 
-def read_chessboard(case: SceneCase, image: Image) -> Reading:
+def read_chessboard(case: SceneCase, image: Image) -> FoundPoints:
     """OpenCV's findChessboardCorners with cornerSubPix."""
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     started = time.process_time()
     found, corners = cv2.findChessboardCorners(gray, INNER_CORNERS)
     points = _refine_sub_pixel(gray, _as_points(corners)) if found else np.empty((0, 2))
-    return Reading(points, _elapsed_ms(started))
+    return FoundPoints(points, _elapsed_ms(started))
 
 
-def chess_corners_reader(refiner: str) -> Callable[[SceneCase, Image], Reading]:
+def chess_corners_reader(refiner: str) -> Callable[[SceneCase, Image], FoundPoints]:
     """The ChESS detector of the package chess-corners with one of its refiners."""
 
     @cache
@@ -159,11 +159,11 @@ def chess_corners_reader(refiner: str) -> Callable[[SceneCase, Image], Reading]:
         chosen = getattr(package.ChessRefiner, refiner)()
         return package.Detector(package.DetectorConfig.chess().with_chess(refiner=chosen))
 
-    def read(case: SceneCase, image: Image) -> Reading:
+    def read(case: SceneCase, image: Image) -> FoundPoints:
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         started = time.process_time()
         points = detector().detect(gray).xy
-        return Reading(points.astype(np.float64), _elapsed_ms(started))
+        return FoundPoints(points.astype(np.float64), _elapsed_ms(started))
 
     return read
 

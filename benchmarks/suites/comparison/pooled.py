@@ -14,7 +14,7 @@ from benchmarks.suites.comparison.measure import (
     point_errors,
     required_markers,
 )
-from benchmarks.suites.comparison.methods import METHODS, Method, Reading
+from benchmarks.suites.comparison.methods import METHODS, FoundPoints, Method
 from benchmarks.suites.scenes import STANDARD_BLUR_PX, STANDARD_PITCH_PX, Response, SceneCase
 from cmpdesign.scene import render
 from cmpdesign.scene.bounds.exact_bound import exact_bound
@@ -128,7 +128,7 @@ def _update_sums(
 
 
 def _normalised_squares(
-    errors: NDArray[np.float64], reading: Reading, found: NDArray[np.bool_]
+    errors: NDArray[np.float64], reading: FoundPoints, found: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """(N,) e' C^-1 e of the found markers; empty if the method states no covariance."""
     if reading.cov_px2 is None:

@@ -18,7 +18,7 @@ from cmpdesign.calibration.rays import pixel_grid, ray_covariances, ray_differen
 from extractor import View
 
 Array = NDArray[np.float64]
-MOST_RATIO = 1.1  # of a ray error over the best one, for a good choice of the model
+MAX_RATIO = 1.1  # of a ray error over the best one, for a good choice of the model
 COLUMNS = {
     "condition": TEXT, "cameras": "d", "seen px": ".4f", "stated px": ".4f", "z": ".2f", "parameters z": ".2f",
     "image px": ".4f", "model within 1.1": TEXT, "bad found": TEXT, "good left out": "d", "chessboard px": ".4f",
@@ -115,7 +115,7 @@ def pooled_row(name: str, rows: Sequence[CameraFigures]) -> tuple[object, ...]:
         pooled["z"],
         pooled.get("parameters_z", float("nan")),
         pooled["image_px"],
-        f"{sum(one <= MOST_RATIO for one in ratios)} of {len(ratios)}",
+        f"{sum(one <= MAX_RATIO for one in ratios)} of {len(ratios)}",
         f"{sum(row.bad_found for row in rows)} of {sum(row.bad for row in rows)}",
         sum(row.good_refused for row in rows),
         board_px,

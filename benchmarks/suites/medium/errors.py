@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.medium.rigs import RandomRig, Reading, read_rig
+from benchmarks.suites.medium.rigs import PressedFrame, RandomRig, read_rig
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Medium
 from extractor import Reconstructor, parse_layout
@@ -63,7 +63,7 @@ def measure_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[DepthErr
         yield depth_errors(AIR, found, straight, None)
 
 
-def depth_errors(row: str, found: RandomRig, reading: Reading, medium: Medium | None) -> DepthErrors:
+def depth_errors(row: str, found: RandomRig, reading: PressedFrame, medium: Medium | None) -> DepthErrors:
     """The errors of a reading if this were the medium."""
     layout = parse_layout(layout_to_json(found.layout))
     reconstructor = Reconstructor(layout, found.rig(medium), reading.rest)

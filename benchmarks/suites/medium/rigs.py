@@ -66,7 +66,7 @@ class RandomRig:
 
 
 @dataclass(frozen=True)
-class Reading:
+class PressedFrame:
     """The read and the true markers of one pressed frame."""
 
     press_mm: float
@@ -102,7 +102,7 @@ def random_rig(rng: np.random.Generator) -> RandomRig:
     )
 
 
-def read_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[tuple[Reading, Reading]]:
+def read_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[tuple[PressedFrame, PressedFrame]]:
     """For every press the reading through the parallel window, and through a window that is tilted by 1 degree."""
     views = ViewExtractor(parse_layout(layout_to_json(found.layout)), found.rig(found.medium))
     windows = (found.cameras, found.tilted(float(rng.uniform(0, 2 * np.pi)), np.radians(1.0)))
@@ -133,7 +133,7 @@ def read_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[tuple[Readi
             drawn = render(
                 replace(scene, camera=cameras, surface=contact.surface(), seed=_seed(rng)), size=SIZE
             )
-            readings.append(Reading(press_mm, rest, views.extract(drawn.image), drawn.truth))
+            readings.append(PressedFrame(press_mm, rest, views.extract(drawn.image), drawn.truth))
         yield readings[0], readings[1]
 
 

@@ -27,7 +27,7 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import STANDARD_SIZE, Truth
 from extractor import Extractor, Markers, Status, parse_layout
 
-MOST_LOST_LINES = 8
+MAX_LOST_LINES = 8
 Image = NDArray[Any]
 
 
@@ -135,7 +135,7 @@ def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
     edge_px = shortest_edges(shot.scene.layout, truth)
     lost = promised_markers(shot.scene.layout, truth, shot.image.shape) & (markers.status == Status.LOST)
     lines = []
-    for marker in [*np.flatnonzero(wrong), *np.flatnonzero(lost)[:MOST_LOST_LINES]]:
+    for marker in [*np.flatnonzero(wrong), *np.flatnonzero(lost)[:MAX_LOST_LINES]]:
         x, y = truth.marker_xy_px[marker]
         status = Status(markers.status[marker]).name.lower()
         visibility = "visible" if truth.visible[marker] else "not visible"

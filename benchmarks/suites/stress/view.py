@@ -16,7 +16,7 @@ SIZES: dict[float, Size] = {
     12.0: (4000, 3000),
     20.0: (5472, 3648),
 }
-MOST_LAYERS = 45
+MAX_LAYERS = 45
 
 
 def crop_frame(frame: PatternFrame, share: float, angle_deg: float = 0.0) -> PatternFrame:
@@ -37,7 +37,7 @@ def resize_frame(frame: PatternFrame, size: Size, pitch_px: float, layers: int) 
 def frame_filled_with_layers(frame: PatternFrame, size: Size, pitch_px: float) -> PatternFrame:
     """The frame with as many layers as fit the image."""
     fitting = int(min(size) / (2.15 * pitch_px) - 1)
-    return resize_frame(frame, size, pitch_px, min(max(fitting, 2), MOST_LAYERS))
+    return resize_frame(frame, size, pitch_px, min(max(fitting, 2), MAX_LAYERS))
 
 
 def with_contact(frame: PatternFrame, step: float) -> PatternFrame:

@@ -29,12 +29,12 @@ SPOTS, SPOT_EDGES = (1, 8), (0.4, 2.5)  # number, radius
 SCRATCHES, SCRATCH_EDGES = (0, 3), (0.1, 0.5)  # number, width
 COVER_BGR = ((20, 20, 20), (128, 128, 128), (150, 180, 220), (45, 50, 200), (60, 150, 40), (190, 60, 45))
 COVER_NOISE = 2.0  # of 255
-LEAST_SHARE = 0.25  # of a cell that is partly seen
+MIN_SHARE = 0.25  # of a cell that is partly seen
 CLEAR_PX = 2  # distance of a seen cell from every cover and from the picture's rim
 
 
 @dataclass(frozen=True)
-class View:
+class DrawnView:
     """One view of a run. Views that differ in their codes alone differ in their white cells alone."""
 
     kind: str
@@ -59,7 +59,7 @@ class ViewResult:
         reason: the reader's reason; empty without one.
     """
 
-    view: View
+    view: DrawnView
     cells: int
     black_cells: int
     motions: int
@@ -90,7 +90,7 @@ class ShotView:
     motions_of_parts: int
 
 
-def shoot_view(view: View) -> ShotView:
+def shoot_view(view: DrawnView) -> ShotView:
     """Shoot and cover a view."""
     rng = np.random.default_rng([view.seed, view.number, KINDS.index(view.kind)])
     pose = _sample_pose(view, rng)
@@ -111,7 +111,7 @@ def shoot_view(view: View) -> ShotView:
     return ShotView(pose, picture, len(seen), len(black), motions, of_parts)
 
 
-def read_view(view: View) -> ViewResult:
+def read_view(view: DrawnView) -> ViewResult:
     """Shoot, cover, and read a view; one thread."""
     cv2.setNumThreads(1)
     shot = shoot_view(view)
@@ -162,10 +162,10 @@ def seen_cells(
 
 
 def partly_seen_cells(picture: CameraPicture, covers: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """(K,) the red, green and blue cells of which at least ``LEAST_SHARE`` is in the picture and not covered."""
+    """(K,) the red, green and blue cells of which at least ``MIN_SHARE`` is in the picture and not covered."""
     cells = colored_cells(picture.layout)
     corners = np.rint(picture.marker_xy_px[picture.layout.cell_corners[cells]]).astype(int)
-    return np.asarray(cells[[_seen_share(covers, triangle) >= LEAST_SHARE for triangle in corners]])
+    return np.asarray(cells[[_seen_share(covers, triangle) >= MIN_SHARE for triangle in corners]])
 
 
 def _seen_share(covers: NDArray[np.uint8], triangle: NDArray[np.int64]) -> float:
@@ -185,7 +185,7 @@ def _touches(covers: NDArray[np.uint8], triangle: NDArray[np.float64]) -> bool:
     return bool((mask[top:bottom, left:right] & (covers[top:bottom, left:right] > 0)).any())
 
 
-def _sample_pose(view: View, rng: np.random.Generator) -> Pose:
+def _sample_pose(view: DrawnView, rng: np.random.Generator) -> Pose:
     """A pattern of any size, its middle up to 0.9 of its radius from the picture's."""
     layers, pitch_px = int(rng.integers(*LAYERS, endpoint=True)), float(rng.uniform(*view.pitch_px))
     distance, angle = rng.uniform(0, 0.9) * layers * pitch_px, rng.uniform(0, 2 * np.pi)

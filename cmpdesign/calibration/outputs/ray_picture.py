@@ -13,7 +13,7 @@ from cmpdesign.calibration.rays import pixel_grid, ray_covariances
 
 WIDTH_PX, FOOT_PX = 960, 60
 GRID = (49, 37)
-LEAST_PX, MOST_PX = 1e-3, 1.0  # of the color scale, logarithmic
+MIN_PX, MAX_PX = 1e-3, 1.0  # of the color scale, logarithmic
 REGIONS = (8, 6)
 ARROW = 2000.0  # pixels of the picture per px of a mean residual
 
@@ -26,7 +26,7 @@ def ray_picture(found: CameraCalibration) -> NDArray[Any]:
     variance = (
         np.trace(ray_covariances(found.camera, found.cov, pixel_grid(size, *GRID)), axis1=1, axis2=2) / 2
     )
-    deviation = np.sqrt(np.nan_to_num(variance, nan=MOST_PX**2)).reshape(GRID[::-1])
+    deviation = np.sqrt(np.nan_to_num(variance, nan=MAX_PX**2)).reshape(GRID[::-1])
     picture = cv2.resize(_colors(deviation), shown, interpolation=cv2.INTER_CUBIC)
     for sighting in found.adjusted.problem.sightings:
         for x, y in np.round(sighting.xy_px * scale).astype(int):
@@ -36,7 +36,7 @@ def ray_picture(found: CameraCalibration) -> NDArray[Any]:
 
 
 def _colors(deviation_px: NDArray[np.float64]) -> NDArray[Any]:
-    place = np.log(deviation_px / LEAST_PX) / np.log(MOST_PX / LEAST_PX)
+    place = np.log(deviation_px / MIN_PX) / np.log(MAX_PX / MIN_PX)
     return np.asarray(cv2.applyColorMap((255 * np.clip(place, 0, 1)).astype(np.uint8), cv2.COLORMAP_VIRIDIS))
 
 
@@ -69,10 +69,10 @@ def _pixel(xy: NDArray[np.float64]) -> tuple[int, int]:
 def _foot() -> NDArray[Any]:
     """The scale of the colors and of the arrows."""
     foot = np.full((FOOT_PX, WIDTH_PX, 3), 255, np.uint8)
-    values = np.geomspace(LEAST_PX, MOST_PX, 400)[None]
+    values = np.geomspace(MIN_PX, MAX_PX, 400)[None]
     foot[8:26, 20:420] = _colors(np.repeat(values, 18, axis=0))
     for value in (0.001, 0.01, 0.1, 1.0):
-        x = 20 + int(400 * np.log(value / LEAST_PX) / np.log(MOST_PX / LEAST_PX))
+        x = 20 + int(400 * np.log(value / MIN_PX) / np.log(MAX_PX / MIN_PX))
         cv2.putText(
             foot,
             f"{value:g}",

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 HELD = 0.5  # deviation after the pictures over the stated one, from which a number counts as not determined; chosen
 MIN_PLATE_MARKERS = 20
 PRESS_MM = 0.5  # of the displacements that the deviations are made for
-MOST_GEL = 0.3  # of the gel's thickness, for the same
+MAX_GEL = 0.3  # of the gel's thickness, for the same
 EXPLAINED = 0.995  # share of the variance of displacements that the written deviations hold
 
 
@@ -180,7 +180,7 @@ def misread_displacements(
 def press_of(views: Sequence[View]) -> float:
     """``PRESS_MM``, or less where the gel is thin."""
     medium = views[0].medium
-    return PRESS_MM if medium is None or not medium.gel_mm else min(PRESS_MM, MOST_GEL * medium.gel_mm)
+    return PRESS_MM if medium is None or not medium.gel_mm else min(PRESS_MM, MAX_GEL * medium.gel_mm)
 
 
 def _depth_share(problem: RigProblem, views: Sequence[View], modes: Sequence[Deviation]) -> float:

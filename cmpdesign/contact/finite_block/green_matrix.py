@@ -17,7 +17,7 @@ from extractor.layout.layout_file import LayoutLike, layout_of
 Array = NDArray[np.float64]
 LOADS_PER_PITCH = 2  # of the square grid of loads, along a neighbouring distance of markers
 LOAD_WIDTH = 0.5  # in units of the spacing of the loads; their sum is uniform to 2 %, at a depth of one spacing to 1e-3
-MOST_MARKERS, MOST_LOADS = 1500, 4000
+MAX_MARKERS, MAX_LOADS = 1500, 4000
 AREA_SAMPLES = 24  # along each axis of the square of a load whose part inside the outline is counted
 
 
@@ -33,13 +33,13 @@ def make_gel(layout: LayoutLike, elastomer: Elastomer, *, margin_mm: float = 0.0
         ContactError: too many markers or loads, or a negative margin.
     """
     reference = layout_of(layout)
-    require(len(reference.xy_mm) <= MOST_MARKERS, "markers", len(reference.xy_mm), f"at most {MOST_MARKERS}")
+    require(len(reference.xy_mm) <= MAX_MARKERS, "markers", len(reference.xy_mm), f"at most {MAX_MARKERS}")
     require(margin_mm >= 0, "margin_mm", margin_mm, "0 or more")
     outline = _widened(reference.outline_mm, margin_mm)
     edges = np.linalg.norm(np.diff(reference.xy_mm[reference.edges], axis=1)[:, 0], axis=1)
     spacing = float(np.median(edges)) / LOADS_PER_PITCH
     loads, area = _loads(outline, spacing)
-    require(len(loads) <= MOST_LOADS, "loads", len(loads), f"at most {MOST_LOADS}; take a larger pitch")
+    require(len(loads) <= MAX_LOADS, "loads", len(loads), f"at most {MAX_LOADS}; take a larger pitch")
     width = LOAD_WIDTH * spacing
     unit = replace(elastomer, young_mpa=1.0)
     reach = float(np.linalg.norm(np.ptp(outline, axis=0)))

@@ -24,7 +24,7 @@ with extra("evaluate"):
 Array = NDArray[np.float64]
 # Poisson's ratio of both spline solutions at most: beyond it splines of this degree are too stiff.
 LARGEST_POISSON = 0.49
-STEP_PER_THICKNESS, MOST_SPANS = 0.3, 40  # knot span; spans along the longer side at most
+STEP_PER_THICKNESS, MAX_SPANS = 0.3, 40  # knot span; spans along the longer side at most
 POLYNOMIALS = 5
 REACH_THICKNESSES = 2.5  # of the layer without end beyond the outline, before it repeats
 CHUNK = 150  # right-hand sides at once
@@ -42,7 +42,7 @@ class WallResponse:
     def __init__(self, elastomer: Elastomer, outline_mm: Array, points_mm: Array) -> None:
         h = elastomer.thickness_mm
         low, high = outline_mm.min(axis=0), outline_mm.max(axis=0)
-        step = max(STEP_PER_THICKNESS * h, float((high - low).max()) / MOST_SPANS)
+        step = max(STEP_PER_THICKNESS * h, float((high - low).max()) / MAX_SPANS)
         self._x, self._y = (axis_over(low[k], high[k], step) for k in (0, 1))
         z = ThicknessBasis(h, POLYNOMIALS)
         (at_x, weight_x), (at_y, weight_y) = self._x.quadrature(), self._y.quadrature()

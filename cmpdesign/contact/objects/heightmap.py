@@ -21,7 +21,7 @@ from cmpdesign.inputs.files import read_file
 from cmpdesign.libraries import extra
 
 Array = NDArray[np.float64]
-MOST_HEIGHTS = 25_000_000  # of a height map
+MAX_HEIGHTS = 25_000_000  # of a height map
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def _read_npy(path: Path) -> Array:
         raise ContactError(f"{path}: cannot be read as an NPY file ({reason})") from None
     if heights is None:
         raise ContactError(
-            f"{path}: the header states more numbers than the file holds, or more than {MOST_HEIGHTS}"
+            f"{path}: the header states more numbers than the file holds, or more than {MAX_HEIGHTS}"
         )
     if heights.dtype.kind not in "fiu":
         raise ContactError(f"{path}: holds no array of numbers; save heights in mm with numpy.save")
@@ -129,13 +129,13 @@ def _has_all_numbers(data: bytes) -> bool:
         raise ValueError(f"version {version[0]}.{version[1]}; expected 1.0 or 2.0")
     shape, _, kind = readers[version](file)
     count = math.prod(shape)
-    return count <= MOST_HEIGHTS and count * kind.itemsize <= len(data) - file.tell()
+    return count <= MAX_HEIGHTS and count * kind.itemsize <= len(data) - file.tell()
 
 
 def _read_gray(path: Path) -> Array:
     """(rows, columns) float64 brightness from 0 to 1."""
     try:
-        pixels = decode_image(path, MOST_HEIGHTS)
+        pixels = decode_image(path, MAX_HEIGHTS)
     except ImageFileError as error:
         raise ContactError(f"{error} (a height map is a grayscale PNG, or an NPY file in mm)") from None
     if pixels.dtype not in (np.uint8, np.uint16):

@@ -30,9 +30,9 @@ KINDS: Mapping[str, frozenset[str]] = {
     "repeat": frozenset({"of"}),
     "chance": frozenset({"of"}),
 }
-MOST_REPEATS = 1000
-MOST_VALUES = 10_000  # of one draw; a scene of 100 blobs, scratches and lamps each has some 2,000
-MOST_DEVIATIONS = 3.0
+MAX_REPEATS = 1000
+MAX_VALUES = 10_000  # of one draw; a scene of 100 blobs, scratches and lamps each has some 2,000
+MAX_DEVIATIONS = 3.0
 Scalar = str | float | int | bool
 
 
@@ -98,7 +98,7 @@ def _draw_kind(kind: str, table: Mapping[str, Any], rng: Source) -> Any:
 def _standard_normal(rng: Source) -> float:
     while True:
         value = float(rng.standard_normal())
-        if abs(value) <= MOST_DEVIATIONS:
+        if abs(value) <= MAX_DEVIATIONS:
             return value
 
 
@@ -122,9 +122,9 @@ def check_distributions(value: Any, path: str) -> None:
     """
     _check_value(value, path)
     most = _most_values(value)
-    if most > MOST_VALUES:
+    if most > MAX_VALUES:
         raise CmpDesignError(
-            f"{path}: one draw can have {most:.4g} values; the limit is {MOST_VALUES}; make repeat smaller"
+            f"{path}: one draw can have {most:.4g} values; the limit is {MAX_VALUES}; make repeat smaller"
         )
 
 
@@ -186,9 +186,9 @@ def _check_kind(kind: str, table: Mapping[str, Any], path: str) -> None:
             _require(_is_number(given) and 0 <= given <= 1, path, kind, given, "a number from 0 to 1")
         case "repeat":
             counts = _whole_numbers(given)
-            good = counts is not None and all(0 <= count <= MOST_REPEATS for count in counts)
+            good = counts is not None and all(0 <= count <= MAX_REPEATS for count in counts)
             limit = (
-                f"a whole number from 0 to {MOST_REPEATS}, or {{whole = [...]}} or {{choice = [...]}} of them"
+                f"a whole number from 0 to {MAX_REPEATS}, or {{whole = [...]}} or {{choice = [...]}} of them"
             )
             _require(good, path, kind, given, limit)
         case _:

@@ -29,8 +29,8 @@ from cmpdesign.scene.files.scene_file import SceneFile, SolvedScene, scene_from_
 from extractor import Extractor, Markers, Reference
 from extractor.pipeline import Side
 
-MOST_ATTEMPTS = 20  # draws of one frame
-MOST_READERS = 64
+MAX_ATTEMPTS = 20  # draws of one frame
+MAX_READERS = 64
 SEEDS = 1 << 32
 Array = NDArray[Any]
 
@@ -95,7 +95,7 @@ class FrameMaker:
         """The reader for a side and the sensor's response; the last readers are kept."""
         key = f"{design.name} {mirrored} {response}"
         if key not in self._readers:
-            if len(self._readers) >= MOST_READERS:
+            if len(self._readers) >= MAX_READERS:
                 self._readers.clear()
             side: Side = "back" if mirrored else "front"
             preset = self._plan["markers"]["preset"]
@@ -106,11 +106,11 @@ class FrameMaker:
         """The frame at a place of a shard.
 
         Raises:
-            PlanError: no draw of ``MOST_ATTEMPTS`` can be rendered.
+            PlanError: no draw of ``MAX_ATTEMPTS`` can be rendered.
             SceneError: a draw has values that no scene can have.
         """
         number = shard * self._plan["frames_a_shard"] + place
-        for attempt in range(MOST_ATTEMPTS):
+        for attempt in range(MAX_ATTEMPTS):
             rng = frame_rng(self._plan["digest"], shard, place, attempt)
             design = self._designs[draw(self._choice, rng)]
             document = draw(self._plan["scene"], rng) | {"seed": int(SEEDS * rng.random())}
@@ -120,7 +120,7 @@ class FrameMaker:
             except SceneError as error:
                 problem = str(error)
         raise PlanError(
-            f"frame {number}: none of {MOST_ATTEMPTS} draws can be rendered; the last draw: {problem}; "
+            f"frame {number}: none of {MAX_ATTEMPTS} draws can be rendered; the last draw: {problem}; "
             "narrow the plan's ranges"
         )
 

@@ -17,7 +17,7 @@ from cmpdesign.contact.objects.heightmap import HeightMap
 from cmpdesign.data.frames.distributions import distribution_kind, is_drawn
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.files.images import ImageFileError, read_image
-from cmpdesign.inputs.files import MOST_DATA_BYTES, read_file
+from cmpdesign.inputs.files import MAX_DATA_BYTES, read_file
 from cmpdesign.inputs.sources import IMAGE_SUFFIXES
 
 
@@ -67,7 +67,7 @@ def take_inputs(scene: Mapping[str, Any], plan: Path, inputs_from: Sequence[str 
             _check_place(place, path, folders)
         except (CmpDesignError, ContactError, ImageFileError) as error:
             raise CmpDesignError(f"{plan}: {place.name}: {error}") from None
-        content = read_file(path, MOST_DATA_BYTES)
+        content = read_file(path, MAX_DATA_BYTES)
         ending = path.suffix.lower() if path.suffix.lower() in {*IMAGE_SUFFIXES, ".npy"} else ""
         name = f"inputs/{hashlib.sha256(content).hexdigest()[:16]}{ending}"
         taken[name] = content

@@ -17,9 +17,9 @@ from cmpdesign.data.frames.distributions import Source, check_distributions, dra
 from cmpdesign.data.frames.inputs import take_inputs
 from cmpdesign.data.records import (
     FORMAT_FRAMES,
-    MOST_DESIGNS,
-    MOST_FRAMES,
-    MOST_FRAMES_A_SHARD,
+    MAX_DESIGNS,
+    MAX_FRAMES,
+    MAX_FRAMES_A_SHARD,
     ImageTable,
     MarkersTable,
 )
@@ -52,10 +52,10 @@ class PlanTable(Record):
 
     name: Name = ""
     description: Line = ""
-    frames: int = Field(ge=1, le=MOST_FRAMES)
-    frames_a_shard: int = Field(1000, ge=1, le=MOST_FRAMES_A_SHARD)
+    frames: int = Field(ge=1, le=MAX_FRAMES)
+    frames_a_shard: int = Field(1000, ge=1, le=MAX_FRAMES_A_SHARD)
     seed: int = Field(0, ge=0)
-    designs: list[str] = Field(min_length=1, max_length=MOST_DESIGNS)
+    designs: list[str] = Field(min_length=1, max_length=MAX_DESIGNS)
     weights: list[float] | None = None
     largest_strain: float | None = Field(
         None, gt=0, description="Contacts of a larger strain are drawn anew; null: no limit."

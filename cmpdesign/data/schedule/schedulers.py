@@ -16,9 +16,9 @@ from cmpdesign.data.schedule.processes import one_thread, work_on_one_thread
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.workers import worker_pool
 
-MOST_LOSSES = 3  # of workers, one after another without a result in between
+MAX_LOSSES = 3  # of workers, one after another without a result in between
 DASK = "dask="
-MOST_WORKERS = 512
+MAX_WORKERS = 512
 Work = Callable[[Any], Any]
 
 
@@ -39,10 +39,10 @@ def parse_scheduler(text: str, workers: int | None) -> Scheduler:
     """The scheduler from "local" or "dask=ADDRESS"; ``workers`` None: one for each core that this process may use.
 
     Raises:
-        CmpDesignError: another text, or a number of workers that is not from 1 to ``MOST_WORKERS``.
+        CmpDesignError: another text, or a number of workers that is not from 1 to ``MAX_WORKERS``.
     """
-    if workers is not None and not 1 <= workers <= MOST_WORKERS:
-        raise CmpDesignError(f"workers is {workers}; it must be from 1 to {MOST_WORKERS}")
+    if workers is not None and not 1 <= workers <= MAX_WORKERS:
+        raise CmpDesignError(f"workers is {workers}; it must be from 1 to {MAX_WORKERS}")
     if text == "local":
         return Scheduler(workers=workers or _usable_cores())
     address = text.removeprefix(DASK)
@@ -100,7 +100,7 @@ def _local_results(work: Work, items: Sequence[Any], workers: int) -> Generator[
                 open_items.remove(place)
                 yield result
         losses = losses + 1 if len(open_items) == before else 1
-        if open_items and losses > MOST_LOSSES:
+        if open_items and losses > MAX_LOSSES:
             raise CmpDesignError(
                 f"{losses} times a worker was killed without a result, the last time with "
                 f"{len(open_items)} parts left; check that there is memory for {workers} workers"

@@ -17,7 +17,7 @@ from cmpdesign.inputs.texts import visible
 SYSTEM = Path("/sys/class/video4linux")
 DEVICES = Path("/dev")
 _DEVICE = re.compile(r"video(\d+)", re.ASCII)
-_MOST_BYTES = 4096  # of a file of the kernel
+_MAX_BYTES = 4096  # of a file of the kernel
 _PARENTS = 4  # from a device to the USB device that has the serial number
 
 
@@ -102,6 +102,6 @@ def _serial(entry: Path) -> str:
 
 def _text(path: Path) -> str:
     try:
-        return visible(read_text(path, _MOST_BYTES).strip())[:100]
+        return visible(read_text(path, _MAX_BYTES).strip())[:100]
     except InputError:
         return ""

@@ -16,7 +16,7 @@ Ioctl = Callable[[int, int, bytearray], object]
 _CAPTURE = 0x1 | 0x1000  # V4L2_CAP_VIDEO_CAPTURE, _MPLANE
 _BUFFER_TYPE = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
 _DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE, V4L2_FRMIVAL_TYPE_DISCRETE
-_MOST_ENTRIES = 256  # of a list that a driver gives
+_MAX_ENTRIES = 256  # of a list that a driver gives
 _CAPABILITY, _FORMAT, _SIZE, _INTERVAL, _CONTROL = "<16s32s32s6I", "<3I32s5I", "<11I", "<13I", "<2I32s4i3I"
 _QUERYCAP, _ENUM_FMT, _ENUM_SIZES, _ENUM_INTERVALS, _QUERYCTRL = 0, 2, 74, 75, 36
 # Controls that are shown -> their numbers, V4L2_CID_*.
@@ -106,7 +106,7 @@ def _asked(
 def _entries(descriptor: int, ask: Ioctl, number: int, layout: str, *key: int) -> Iterator[tuple[int, ...]]:
     """The entries of a list that a driver ends with an error."""
     for index in count():
-        if index == _MOST_ENTRIES:
+        if index == _MAX_ENTRIES:
             return
         given = struct.pack(f"<{1 + len(key)}I", index, *key)
         try:

@@ -11,9 +11,9 @@ from cmpdesign.products.materials.silicones import Silicone
 from cmpdesign.products.process_sheet.steps import NeededMaterial, Table
 
 # Less than a gram of either part cannot be weighed to a percent on a scale of 0.01 g.
-LEAST_PART_G = 1.0
+MIN_PART_G = 1.0
 # A tenth of a gram of an additive is weighed to a tenth on this scale.
-LEAST_ADDITIVE_G = 0.1
+MIN_ADDITIVE_G = 0.1
 ROOM_DEG_C = 23
 # Temperature at which a tool's parts begin to yield, degrees Celsius: usual glass transitions of PLA, PETG and of
 # standard resins, less 10; metals stand every cure.
@@ -50,8 +50,8 @@ class Weighing:
 def weigh(name: str, silicone: Silicone, volume_mm3: float, *, dough: bool = False) -> Weighing:
     """What is weighed to fill a volume; a layer with the name of a color has pigment, a dough retarder and thickener.
 
-    A mixture is the cast mass and the losses, but at least so much that the smaller part weighs ``LEAST_PART_G``
-    and every additive ``LEAST_ADDITIVE_G``.
+    A mixture is the cast mass and the losses, but at least so much that the smaller part weighs ``MIN_PART_G``
+    and every additive ``MIN_ADDITIVE_G``.
     """
     cast_g = volume_mm3 * silicone.density_g_cm3.value / 1000
     pigment = silicone.pigment_percent.value / 100 if name in COLORS else 0.0
@@ -59,8 +59,8 @@ def weigh(name: str, silicone: Silicone, volume_mm3: float, *, dough: bool = Fal
     thickener = silicone.thickener_percent.value / 100 if dough else 0.0
     a, b = silicone.parts_a_b.value
     wanted_g = cast_g * (1 + silicone.loss_percent.value / 100) / (1 + pigment + retarder + thickener)
-    added = [LEAST_ADDITIVE_G / share for share in (pigment, retarder, thickener) if share]
-    both_g = max(wanted_g, LEAST_PART_G * (a + b) / min(a, b), *added)
+    added = [MIN_ADDITIVE_G / share for share in (pigment, retarder, thickener) if share]
+    both_g = max(wanted_g, MIN_PART_G * (a + b) / min(a, b), *added)
     a_g, b_g = both_g * a / (a + b), both_g * b / (a + b)
     return Weighing(name, silicone, cast_g, a_g, b_g, pigment * both_g, retarder * both_g, thickener * both_g)
 
@@ -112,7 +112,7 @@ def mix_tables(mix: Weighing, tool: str = "") -> tuple[Table, Table]:
         ("retarder", f"{mix.retarder_g:.2f} g", f"{silicone.retarder_percent.stated('%')} of A and B"),
         ("thickener", f"{mix.thickener_g:.2f} g", f"{silicone.thickener_percent.stated('%')} of A and B"),
         ("mixture", f"{mix.mix_g:.2f} g", f"losses {silicone.loss_percent.stated('%')}, and at least "
-         f"{LEAST_PART_G:g} g of a part, {LEAST_ADDITIVE_G:g} g of an additive"),
+         f"{MIN_PART_G:g} g of a part, {MIN_ADDITIVE_G:g} g of an additive"),
     )  # fmt: skip
     used = tuple(row for row in masses if row[1] != "0.00 g")
     return Table((mix.name, "mass", "why"), used), cure_table(silicone, tool)

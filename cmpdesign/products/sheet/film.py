@@ -72,13 +72,13 @@ def register_marks(width_mm: float, height_mm: float) -> tuple[list[Points], lis
     """Crosses in the middle of the four edges of a page: their lines across the page, and along it."""
     half, line = REGISTER_MM / 2, HAIRLINE_MM / 2
     inside = half + 2.0
-    centers = [
+    centres = [
         (width_mm / 2, inside),
         (width_mm / 2, height_mm - inside - TEXT_MM),
         (inside, height_mm / 2),
         (width_mm - inside, height_mm / 2),
     ]
     return (
-        [rectangle_points(x - half, y - line, 2 * half, 2 * line) for x, y in centers],
-        [rectangle_points(x - line, y - half, 2 * line, 2 * half) for x, y in centers],
+        [rectangle_points(x - half, y - line, 2 * half, 2 * line) for x, y in centres],
+        [rectangle_points(x - line, y - half, 2 * line, 2 * half) for x, y in centres],
     )

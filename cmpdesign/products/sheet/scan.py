@@ -22,7 +22,7 @@ SEARCH_PX = (2400, 1800, 1200)
 # bar's sides are measured INSIDE_MM from the end.
 REACH_MM, ACROSS_MM, INSIDE_MM = 2.5, 0.6 * THICK_MM, 3.0
 # Least difference of gray levels between ink and paper.
-LEAST_CONTRAST = 40.0
+MIN_CONTRAST = 40.0
 # Passes of measuring a bar with a prediction corrected by the pass before.
 REFINE_PASSES = 3
 MM_PER_INCH = 25.4
@@ -253,7 +253,7 @@ def _locate_edge_mm(
     values = cv2.remap(gray, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     profile = values.astype(np.float64).mean(axis=1)
     dark, bright = np.percentile(profile, [10, 90])
-    if bright - dark < LEAST_CONTRAST:
+    if bright - dark < MIN_CONTRAST:
         return None
     level = (dark + bright) / 2
     rising = np.flatnonzero((profile[:-1] < level) & (profile[1:] >= level))

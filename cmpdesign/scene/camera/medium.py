@@ -21,8 +21,8 @@ from cmpdesign.scene.errors import STRICT, SceneError
 
 Points = NDArray[np.float64]
 
-MOST_MM, MOST_INDEX = 1000.0, 4.0
-MOST_STEPS = 50  # of Newton's method
+MAX_MM, MAX_INDEX = 1000.0, 4.0
+MAX_STEPS = 50  # of Newton's method
 CONVERGED = 1e-8  # of a step, relative to the offset and the distances: the error is about its square
 ON_WINDOW_MM = 1e-9  # rounding of a pattern that lies on the window
 
@@ -48,15 +48,15 @@ class Medium:
     def __post_init__(self) -> None:
         for layer in ("gel", "window"):
             mm, index = getattr(self, f"{layer}_mm"), getattr(self, f"{layer}_index")
-            if not 0 <= mm <= MOST_MM:
-                raise SceneError(f"{layer}_mm is {mm:g}; it must lie between 0 and {MOST_MM:g} mm")
+            if not 0 <= mm <= MAX_MM:
+                raise SceneError(f"{layer}_mm is {mm:g}; it must lie between 0 and {MAX_MM:g} mm")
             if mm > 0 and index is None:
                 raise SceneError(
                     f"{layer}_index is missing; give the {layer}'s index of refraction "
                     "(silicone about 1.41, acrylic 1.49, glass 1.52)"
                 )
-            if index is not None and not 1 <= index <= MOST_INDEX:
-                raise SceneError(f"{layer}_index is {index:g}; it must lie between 1 and {MOST_INDEX:g}")
+            if index is not None and not 1 <= index <= MAX_INDEX:
+                raise SceneError(f"{layer}_index is {index:g}; it must lie between 1 and {MAX_INDEX:g}")
 
     @property
     def is_air(self) -> bool:
@@ -124,7 +124,7 @@ def _crossing_offset(medium: Medium, h: float, gel_mm: Points, offset: Points) -
     """(N,) x with r(x) = ``offset`` (N,), see the module."""
     layers = ((medium.window_mm, medium.window_index), (gel_mm, medium.gel_index if medium.gel_mm else 1.0))
     x = offset * h / (h + medium.window_mm + gel_mm)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         length = np.hypot(x, h)
         sine, slope_of_sine = x / length, h**2 / length**3
         reached, slope = x.copy(), np.ones_like(x)

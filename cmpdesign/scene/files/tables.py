@@ -44,7 +44,7 @@ LOOKING_KEYS = (
 )
 BACKGROUNDS = {"plain": Plain, "gradient": Gradient, "paper": Paper, "busy": Busy}
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's kinds of errors
-MOST_ERRORS, MOST_VALUE_LETTERS = 20, 80  # of a message
+MAX_ERRORS, MAX_VALUE_LETTERS = 20, 80  # of a message
 MUST_BE = "; it must be "  # between a value and the type that it must have
 TYPE_NAME = re.compile(r"float|str|[a-z-]+\[.*\]", re.DOTALL)  # as pydantic writes the types of a union
 # A key frame's value is a number, or a position as [x, y] or [x, y, z].
@@ -236,7 +236,7 @@ def _validate_table(model: type, table: Mapping[str, Any], where: str) -> Any:
         # Strict validation of JSON accepts lists for tuples and tables for dataclasses, but no texts for numbers.
         return TypeAdapter(model).validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
-        messages = [_error_message(item, model, where) for item in error.errors()[:MOST_ERRORS]]
+        messages = [_error_message(item, model, where) for item in error.errors()[:MAX_ERRORS]]
         raise SceneError("; ".join(_join_alternatives(messages))) from None
 
 
@@ -263,7 +263,7 @@ def _error_message(item: Any, model: type, where: str) -> str:
     unit = next((f" in {unit}" for unit in ("mm", "deg", "px") if key.endswith(f"_{unit}")), "")
     text = text.replace("an object", "a table").replace("a valid array", "a list")
     shown = "a table" if isinstance(item["input"], dict) else json.dumps(item["input"])
-    shown = shown if len(shown) <= MOST_VALUE_LETTERS else shown_value(item["input"])
+    shown = shown if len(shown) <= MAX_VALUE_LETTERS else shown_value(item["input"])
     return f"{table}{key} is {shown}{MUST_BE}{text}{unit}"
 
 

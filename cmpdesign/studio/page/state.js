@@ -1,6 +1,6 @@
 // The design of the page: one object of fields, with its history; it is in the address, so that a link is the design.
 
-const RECENT = "cmpdesign.recent", MOST_RECENT = 6, MOST_STEPS = 200, ONE_STEP_MS = 700;
+const RECENT = "cmpdesign.recent", MAX_RECENT = 6, MAX_STEPS = 200, ONE_STEP_MS = 700;
 
 class DesignState {
   fields = { pattern: "honeycomb", layers: 10, pitch_mm: 1.5 };
@@ -16,7 +16,7 @@ class DesignState {
     const now = performance.now();
     if (!name || name !== this.#last.name || now - this.#last.ms > ONE_STEP_MS) {
       this.#past.push(this.fields);
-      this.#past.splice(0, this.#past.length - MOST_STEPS);
+      this.#past.splice(0, this.#past.length - MAX_STEPS);
     }
     this.#last = { name, ms: now };
     this.#future = [];
@@ -63,7 +63,7 @@ class DesignState {
 
   remember() {
     const text = JSON.stringify(this.fields);
-    const kept = [this.fields, ...this.recent().filter((one) => JSON.stringify(one) !== text)].slice(0, MOST_RECENT);
+    const kept = [this.fields, ...this.recent().filter((one) => JSON.stringify(one) !== text)].slice(0, MAX_RECENT);
     try { localStorage.setItem(RECENT, JSON.stringify(kept)); } catch { /* no storage: no list */ }
   }
 

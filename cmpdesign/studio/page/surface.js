@@ -3,7 +3,7 @@
 
 import * as three from "./three.js";
 
-const PRESSED = new three.Color("#ff2020").toArray(), SHEAR_COLOR = "#ffe94a", LEAST_SHEAR = 0.04; // of the largest
+const PRESSED = new three.Color("#ff2020").toArray(), SHEAR_COLOR = "#ffe94a", MIN_SHEAR = 0.04; // of the largest
 
 export class Surface {
   constructor() {
@@ -54,7 +54,7 @@ export class Surface {
     const { position } = this.shear.geometry.attributes, shear = contact?.shear_mpa ?? [], lengths = shear.map((by) => Math.hypot(...by)), most = Math.max(...lengths, 1e-6);
     let end = 0;
     shear.forEach((by, at) => {
-      if (lengths[at] < LEAST_SHEAR * most) return;
+      if (lengths[at] < MIN_SHEAR * most) return;
       for (const share of [0, (2 * this.edge_mm) / most]) {
         place[at].forEach((value, axis) => { position.array[3 * end + axis] = value + (factor - 1) * moved[at][axis] + share * (by[axis] ?? 0); });
         end += 1;

@@ -11,7 +11,7 @@ import numpy as np
 
 from cmpdesign.errors import CmpDesignError, OutputError, parameter
 from cmpdesign.files.atomic import Stage
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.tracking.export.lerobot_tables import (
     DATA_FILE_MB,
     DATA_PATH,
@@ -59,7 +59,7 @@ class LeRobotDataSet:
     task: str = "contact"
     robot: str | None = None
     images: tuple[str, ...] = ()
-    most_pixels: int = MOST_PIXELS
+    most_pixels: int = MAX_PIXELS
 
 
 def write_lerobot(runs: Sequence[Path], path: Path, about: LeRobotDataSet) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, parameter
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.tracking.export.runs import Run
 from cmpdesign.tracking.export.video import pixels_of
 from cmpdesign.tracking.sources import Reading, open_source
@@ -16,7 +16,7 @@ from cmpdesign.tracking.sources import Reading, open_source
 Picture = NDArray[np.uint8]
 
 
-def run_images(run: Run, source: str, most_pixels: int = MOST_PIXELS) -> Iterator[Picture]:
+def run_images(run: Run, source: str, most_pixels: int = MAX_PIXELS) -> Iterator[Picture]:
     """The image of every frame of a run, (H, W, 3) uint8 BGR; black where the source has no image.
 
     Args:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.atomic import Stage
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.libraries import extra
 from cmpdesign.tracking.export.run_images import require_sources, run_images
 from cmpdesign.tracking.export.runs import read_run, require_one_kind
@@ -38,7 +38,7 @@ def require_zarr() -> Any:
 
 
 def write_zarr(
-    runs: Sequence[Path], path: Path, images: Sequence[str] = (), most_pixels: int = MOST_PIXELS
+    runs: Sequence[Path], path: Path, images: Sequence[str] = (), most_pixels: int = MAX_PIXELS
 ) -> int:
     """Write a replay buffer; the buffer is complete on disk before it gets its name.
 

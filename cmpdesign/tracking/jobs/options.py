@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, TypedDict
 
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.inputs.options import Channels, Preset, Response, Side, Usual
 
 RESPONSE = "srgb|linear|EXPONENT"
@@ -56,7 +56,7 @@ class SequenceOptions(TypedDict, total=False):
     response: Annotated[Response | None, Usual(None, metavar=RESPONSE)]
     side: Annotated[Side, Usual("designed")]
     channels: Annotated[Channels, Usual("bgr")]
-    max_pixels: Annotated[int, Usual(MOST_PIXELS, metavar="COUNT", least=256)]
+    max_pixels: Annotated[int, Usual(MAX_PIXELS, metavar="COUNT", least=256)]
     frame_id: Annotated[str, Usual("tactile", metavar="NAME")]
     with_images: Annotated[bool, Usual(False)]
     live: Annotated[Literal["foxglove", "rerun"] | None, Usual(None)]

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from cmpdesign.errors import SourceError, parameter
 from cmpdesign.files.images import FEWEST_BITS
 from cmpdesign.inputs.cameras import CameraSettings, CameraState
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Reading:
     """
 
     fps: float | None = None
-    max_pixels: int = MOST_PIXELS
+    max_pixels: int = MAX_PIXELS
     times: str | None = None
     bits: int | None = None
     camera: CameraSettings = field(default_factory=CameraSettings)

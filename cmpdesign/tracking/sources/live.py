@@ -11,14 +11,14 @@ from typing import Any
 from cmpdesign.errors import SourceError, parameter
 from cmpdesign.files.images import ImageFileError, decode_bytes
 from cmpdesign.inputs.cameras import CameraSettings, CameraState, set_camera
-from cmpdesign.inputs.files import MOST_PIXELS
+from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.inputs.sources import has_jpeg_end, without_password
 from cmpdesign.inputs.videos import CUT_OFF, decoded_frames, opened_stream, packets_of
 from cmpdesign.tracking.sources.frame_source import SourceFrame, SourceTimes
 
 MAX_FAILED_READS = 10  # consecutive failures after which a camera counts as ended
-MOST_DELAY_S = 1.0  # from a camera's time stamp to the arrival; a longer time means stamps of another clock
-MOST_LEAD_S = 0.5  # of stamps before the arrival; frames that wait at the start explain less than that
+MAX_DELAY_S = 1.0  # from a camera's time stamp to the arrival; a longer time means stamps of another clock
+MAX_LEAD_S = 0.5  # of stamps before the arrival; frames that wait at the start explain less than that
 _ARRIVAL = "times: of arrival, because"
 
 
@@ -28,7 +28,7 @@ class LiveClock:
     A stamp is used where it is later than the previous frame, and not long before the arrival; some drivers give no
     stamps. Stamps shortly before their arrival are on our clock, as Linux has them. Of others the least delay so far is
     the camera's clock against ours, as a frame cannot arrive before it is taken. Stamps that run ahead of it by
-    ``MOST_LEAD_S`` are no clock, and times are those of arrival from then on.
+    ``MAX_LEAD_S`` are no clock, and times are those of arrival from then on.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class LiveClock:
     def time_s(self, stamp_s: float, now_s: float) -> float:
         """The time of a frame; ``stamp_s``: on the camera's clock, NaN without an image; ``now_s``: of its arrival."""
         if self._start_s is None:
-            self._start_s = stamp_s if 0 <= now_s - stamp_s < MOST_DELAY_S else now_s
+            self._start_s = stamp_s if 0 <= now_s - stamp_s < MAX_DELAY_S else now_s
             began_s = time.time() - (now_s - self._start_s)
             origin = ("arrival", self._start_s)
             self.times = replace(self.times, began_unix_s=began_s, began_of="clock", origin=origin)
@@ -55,16 +55,16 @@ class LiveClock:
     def _by_stamp_s(self, stamp_s: float, arrival_s: float) -> float:
         if self._offset_s is None:
             start_s = self._start_s or 0.0
-            is_ours = 0 <= arrival_s + start_s - stamp_s < MOST_DELAY_S
+            is_ours = 0 <= arrival_s + start_s - stamp_s < MAX_DELAY_S
             self._offset_s = self._first_offset_s = -start_s if is_ours else arrival_s - stamp_s
         self._offset_s = min(self._offset_s, arrival_s - stamp_s)
-        if self._first_offset_s - self._offset_s > MOST_LEAD_S:
+        if self._first_offset_s - self._offset_s > MAX_LEAD_S:
             self._has_stamps = False
             text = f"{_ARRIVAL} the stamps of the source run ahead of them"
             self.times = replace(self.times, of="arrival", text=text, camera_clock_s=None)
             return arrival_s
         by_camera_s = stamp_s + self._offset_s
-        if by_camera_s <= self._last_s or arrival_s - by_camera_s >= MOST_DELAY_S:
+        if by_camera_s <= self._last_s or arrival_s - by_camera_s >= MAX_DELAY_S:
             return arrival_s
         if stamp_s > 0 and self.times.of != "camera":
             text = "times: the camera's stamps, from the first frame"
@@ -85,7 +85,7 @@ class StreamSource:
 
     is_live = True
 
-    def __init__(self, address: str, most_pixels: int = MOST_PIXELS) -> None:
+    def __init__(self, address: str, most_pixels: int = MAX_PIXELS) -> None:
         self.name, self.ended_early = f"stream {without_password(address)}", ""
         self._open = ExitStack()
         self._container = self._open.enter_context(opened_stream(address, self.name, most_pixels))

@@ -16,7 +16,7 @@ from cmpdesign.tracking.sources.frame_source import Reading, SourceFrame, Source
 from cmpdesign.tracking.sources.time_table import TimeTable
 
 DEFAULT_FPS = 30.0
-_MOST_FPS = 1e5
+_MAX_FPS = 1e5
 
 
 class ImagesSource:
@@ -51,7 +51,7 @@ class ImagesSource:
         self._times_s, self.times = _times(self._paths, fps or DEFAULT_FPS, fps is not None, times, name)
         steps_s = [b - a for a, b in zip(self._times_s, self._times_s[1:], strict=False) if b > a]
         step_s = median(steps_s) if steps_s and self.times.of in ("names", "table") else 0.0
-        self.fps: float | None = 1 / step_s if step_s > 1 / _MOST_FPS else fps or DEFAULT_FPS
+        self.fps: float | None = 1 / step_s if step_s > 1 / _MAX_FPS else fps or DEFAULT_FPS
         if left_out:
             text = f"{self.times.text}; {left_out} files are left out: hidden, empty or cut off"
             self.times = SourceTimes(**(vars(self.times) | {"text": text}))

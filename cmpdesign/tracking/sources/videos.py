@@ -9,7 +9,7 @@ from pathlib import Path
 from cmpdesign.errors import SourceError, parameter
 from cmpdesign.files.images import is_image_file
 from cmpdesign.inputs.cameras import CameraState
-from cmpdesign.inputs.files import MOST_PIXELS, is_regular_file, path_exists
+from cmpdesign.inputs.files import MAX_PIXELS, is_regular_file, path_exists
 from cmpdesign.inputs.videos import (
     VideoFacts,
     decoded_frames,
@@ -46,7 +46,7 @@ class VideoSource:
         self,
         paths: Sequence[Path],
         fps: float | None = None,
-        most_pixels: int = MOST_PIXELS,
+        most_pixels: int = MAX_PIXELS,
         times: str | TimeTable | None = None,
     ) -> None:
         if times == "names":

@@ -14,7 +14,7 @@ void add_cells(nb::module_ module) {
   bind<&grow>(module, "grow", {"hsv", "seed_xy", "limit_px"});
   bind<&fit_to_moments>(module, "fit_to_moments", {"moments", "seed"});
   bind<&update_triangle_corners>(module, "update_triangle_corners", {"view", "corners", "good"});
-  bind<&link_cells>(module, "link_cells", {"center", "corner"});
+  bind<&link_cells>(module, "link_cells", {"centre", "corner"});
 }
 
 }  // namespace cmp::cells

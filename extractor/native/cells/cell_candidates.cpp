@@ -97,7 +97,7 @@ FoundCells find_candidates(View<const std::uint8_t, 3> image, View<const std::in
                            const CandidateLimits& limits) {
   std::vector<Candidate> all = candidates_of(image, maps, shares, tile_px, limits);
   for (Index i = 0; i < known.area_px.size(); ++i) {
-    Candidate one{known.center_px(i, 0), known.center_px(i, 1), known.area_px[i],
+    Candidate one{known.centre_px(i, 0), known.centre_px(i, 1), known.area_px[i],
                   known.quality[i],      known.share[i],        {}};
     for (Index k = 0; k < 6; ++k) one.corner[k] = known.corner_px(i, k / 2, k % 2);
     all.push_back(one);
@@ -118,7 +118,7 @@ FoundCells find_candidates(View<const std::uint8_t, 3> image, View<const std::in
   FoundCells out{Array<double, 2>({number, 2}), Array<double, 1>({number}), Array<double, 3>({number, 3, 2}),
                  Array<double, 1>({number}), Array<double, 1>({number})};
   for (Index i = 0; i < number; ++i) {
-    out.center_px(i, 0) = kept[i]->x, out.center_px(i, 1) = kept[i]->y;
+    out.centre_px(i, 0) = kept[i]->x, out.centre_px(i, 1) = kept[i]->y;
     out.area_px[i] = kept[i]->area, out.quality[i] = kept[i]->quality, out.share[i] = kept[i]->share;
     for (Index k = 0; k < 6; ++k) out.corner_px(i, k / 2, k % 2) = kept[i]->corner[k];
   }

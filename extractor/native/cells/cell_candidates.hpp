@@ -20,23 +20,23 @@ struct CandidateLimits {
 };
 
 struct FoundCells {
-  Array<double, 2> center_px;  // (N, 2)
+  Array<double, 2> centre_px;  // (N, 2)
   Array<double, 1> area_px;    // (N,) px^2
   Array<double, 3> corner_px;  // (N, 3, 2) clockwise in the image
   Array<double, 1> quality;    // (N,)
   Array<double, 1> share;      // (N,) the level, as a share of the local contrast
 
-  CMP_RECORD("extractor.cells.cells.Cells", center_px, area_px, corner_px, quality, share)
+  CMP_RECORD("extractor.cells.cells.Cells", centre_px, area_px, corner_px, quality, share)
 };
 
 // Cells that were found before.
 struct KnownCells {
-  View<const double, 2> center_px;
+  View<const double, 2> centre_px;
   View<const double, 1> area_px;
   View<const double, 3> corner_px;
   View<const double, 1> quality, share;
 
-  CMP_RECORD("extractor.cells.cells.Cells", center_px, area_px, corner_px, quality, share)
+  CMP_RECORD("extractor.cells.cells.Cells", centre_px, area_px, corner_px, quality, share)
 };
 
 // Cells of the image (H, W, 3), by some of the contrast maps at some shares of the local contrast, and

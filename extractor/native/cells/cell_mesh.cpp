@@ -33,18 +33,18 @@ struct Contact {
   std::int8_t step, back;
 };
 
-// The triangles of N cells, about their centers.
+// The triangles of N cells, about their centres.
 class Triangles {
  public:
-  Triangles(View<const double, 2> center, View<const double, 3> corner)
-      : center_(center),
+  Triangles(View<const double, 2> centre, View<const double, 3> corner)
+      : centre_(centre),
         corner_(corner.shape()),
-        edge_({center.size()}),
-        points_({CORNERS * center.size(), 2}) {
-    for (Index i = 0; i < center.size(); ++i) {
+        edge_({centre.size()}),
+        points_({CORNERS * centre.size(), 2}) {
+    for (Index i = 0; i < centre.size(); ++i) {
       for (int k = 0; k < CORNERS; ++k)
         for (int axis = 0; axis < 2; ++axis) {
-          corner_(i, k, axis) = corner(i, k, axis) - center(i, axis);
+          corner_(i, k, axis) = corner(i, k, axis) - centre(i, axis);
           points_(CORNERS * i + k, axis) = corner(i, k, axis);
         }
       const Vector u = at(i, 1) - at(i, 0), v = at(i, 2) - at(i, 0);
@@ -89,7 +89,7 @@ class Triangles {
  private:
   Vector at(Index i, Index k) const { return {corner_(i, k, 0), corner_(i, k, 1)}; }
   Vector way_of(const Contact& c) const {
-    return {center_(c.to, 0) - center_(c.from, 0), center_(c.to, 1) - center_(c.from, 1)};
+    return {centre_(c.to, 0) - centre_(c.from, 0), centre_(c.to, 1) - centre_(c.from, 1)};
   }
   // The square of the neighbour's distance from where the cell's own triangle expects it, px^2.
   double direction_misfit(Index i, Index shared, Index from, Vector way) const {
@@ -97,7 +97,7 @@ class Triangles {
   }
   void add_contact(std::vector<Contact>& out, Index i, int own, Index other, Index shared,
                    double direction_tolerance) const {
-    const Vector way{center_(other, 0) - center_(i, 0), center_(other, 1) - center_(i, 1)};
+    const Vector way{centre_(other, 0) - centre_(i, 0), centre_(other, 1) - centre_(i, 1)};
     const int a = (own + 1) % CORNERS, b = (own + 2) % CORNERS;
     const double at_a = direction_misfit(i, own, a, way), at_b = direction_misfit(i, own, b, way);
     const int place = at_a < at_b ? a : b;
@@ -111,7 +111,7 @@ class Triangles {
                    static_cast<std::int8_t>(step_of(static_cast<int>(shared), back))});
   }
 
-  View<const double, 2> center_;
+  View<const double, 2> centre_;
   Array<double, 3> corner_;
   Array<double, 1> edge_;
   Array<double, 2> points_;
@@ -161,15 +161,15 @@ double swelling_of(const Triangles& triangles, const MutualContacts& contacts, I
 
 }  // namespace
 
-LinkedCells link_cells(View<const double, 2> center, View<const double, 3> corner,
+LinkedCells link_cells(View<const double, 2> centre, View<const double, 3> corner,
                        const CellMeshLimits& limits) {
-  const Index count = center.size();
+  const Index count = centre.size();
   Array<std::int32_t, 2> neighbours({count, STEPS}, -1);
   Array<std::int8_t, 2> back({count, STEPS}, std::int8_t{-1});
   Array<double, 2> misfit({count, STEPS}, 0.0);
   double swelling = 1.0;
   if (count > 1) {
-    const Triangles triangles(center, corner);
+    const Triangles triangles(centre, corner);
     const auto contacts = triangles.contacts(limits.first_tolerance, limits.direction_tolerance);
     const MutualContacts first(triangles, contacts, count, 1.0, limits.first_tolerance);
     swelling =

@@ -11,7 +11,7 @@ struct CellMeshLimits {
   // corner is an edge away. Chosen.
   double first_tolerance = 0.65;
   double tolerance = 0.4;  // the same with the swelling. Chosen.
-  // in edges, between a neighbour's center and where a cell's own triangle expects it. Chosen.
+  // in edges, between a neighbour's centre and where a cell's own triangle expects it. Chosen.
   double direction_tolerance = 0.56;
   double min_swelling = 0.6, max_swelling = 1.6;  // of a whole image. Chosen.
 };
@@ -33,8 +33,8 @@ struct CellLinks {
 // The links; the swelling: sides of the triangles over those at which neighbours just meet.
 using LinkedCells = std::tuple<CellLinks, double>;
 
-// center (N, 2), corner (N, 3, 2) clockwise in the image.
-LinkedCells link_cells(View<const double, 2> center, View<const double, 3> corner,
+// centre (N, 2), corner (N, 3, 2) clockwise in the image.
+LinkedCells link_cells(View<const double, 2> centre, View<const double, 3> corner,
                        const CellMeshLimits& limits);
 
 }  // namespace cmp::cells

@@ -18,8 +18,8 @@ void fill_ink_colors(const ProfileImage& image, View<double, 1> edges, Index cel
                      numeric::SampleBuffers& buffers, double radius) {
   const auto patches = buffers.patches.view();
   for (Index i = 0; i < cells; ++i) {
-    patches[numeric::X + i] = edges[CENTER_X + i];
-    patches[numeric::Y + i] = edges[CENTER_Y + i];
+    patches[numeric::X + i] = edges[CENTRE_X + i];
+    patches[numeric::Y + i] = edges[CENTRE_Y + i];
     patches[numeric::RADIUS + i] = radius * edges[SIZE + i];
   }
   numeric::fill_patch_means(image.flat, image.height, image.width, cells, buffers);
@@ -37,8 +37,8 @@ void fill_background_colors(const ProfileImage& image, View<double, 1> edges, In
                             numeric::SampleBuffers& buffers, double place, double radius) {
   const auto patches = buffers.patches.view();
   for (Index i = 0; i < count; ++i) {
-    patches[numeric::X + i] = edges[CENTER_X + i] + place * edges[MEDIAN_X + i];
-    patches[numeric::Y + i] = edges[CENTER_Y + i] + place * edges[MEDIAN_Y + i];
+    patches[numeric::X + i] = edges[CENTRE_X + i] + place * edges[MEDIAN_X + i];
+    patches[numeric::Y + i] = edges[CENTRE_Y + i] + place * edges[MEDIAN_Y + i];
     patches[numeric::RADIUS + i] = radius * edges[DEPTH + i];
   }
   numeric::fill_patch_means(image.flat, image.height, image.width, count, buffers);

@@ -14,9 +14,9 @@ constexpr Index column(Index k) { return k * numeric::BATCH_POINTS; }
 
 // the ends
 inline constexpr Index START_X = column(0), START_Y = column(1), END_X = column(2), END_Y = column(3);
-// the cell's center, and the distance of its first corner from the center
-inline constexpr Index CENTER_X = column(4), CENTER_Y = column(5), SIZE = column(6);
-// the normal, the edge's distance from the center, and the vector from the center to its middle
+// the cell's centre, and the distance of its first corner from the centre
+inline constexpr Index CENTRE_X = column(4), CENTRE_Y = column(5), SIZE = column(6);
+// the normal, the edge's distance from the centre, and the vector from the centre to its middle
 inline constexpr Index NORMAL_X = column(7), NORMAL_Y = column(8), DEPTH = column(9);
 inline constexpr Index MEDIAN_X = column(10), MEDIAN_Y = column(11);
 // the ink's color; the weights that turn a color into a share of ink; the background's weighted color

@@ -34,7 +34,7 @@ struct MomentSums {
 
 // The shape of a region, and what gives the corners of its triangle.
 struct MomentShape {
-  double x = 0.0, y = 0.0;             // the center
+  double x = 0.0, y = 0.0;             // the centre
   double triangularity = 0.0;          // 1 for a triangle, 0 for a disc, an ellipse or a square
   double solidity = 0.0;               // 1 for a triangle, 1.21 for an ellipse, less for ragged regions
   double elongation = 0.0;             // (trace of the covariance)^2 / determinant; 4 is equilateral

@@ -11,7 +11,7 @@ namespace {
 
 using Indices = View<const Index, 1>;
 
-// Writes the ends, centers and sizes: the first edge of each cell, then the second, then the third.
+// Writes the ends, centres and sizes: the first edge of each cell, then the second, then the third.
 void fill_edges(View<const double, 3> corners, Indices cells, View<double, 1> edges) {
   const Index count = cells.size();
   for (Index n = 0; n < count; ++n) {
@@ -24,17 +24,17 @@ void fill_edges(View<const double, 3> corners, Indices cells, View<double, 1> ed
       const Index to = k * count + n, end = (k + 1) % 3;
       edges[START_X + to] = corner(k, 0), edges[START_Y + to] = corner(k, 1);
       edges[END_X + to] = corner(end, 0), edges[END_Y + to] = corner(end, 1);
-      edges[CENTER_X + to] = x, edges[CENTER_Y + to] = y;
+      edges[CENTRE_X + to] = x, edges[CENTRE_Y + to] = y;
       edges[SIZE + to] = size;
     }
   }
 }
 
-// Writes the outward normals, the distances and the middles of the edges, relative to the centers.
+// Writes the outward normals, the distances and the middles of the edges, relative to the centres.
 void fill_normals(View<double, 1> edges, Index count) {
   for (Index i = 0; i < count; ++i) {
     const double x = edges[START_X + i], y = edges[START_Y + i];
-    const double cx = edges[CENTER_X + i], cy = edges[CENTER_Y + i];
+    const double cx = edges[CENTRE_X + i], cy = edges[CENTRE_Y + i];
     const double dx = edges[END_X + i] - x, dy = edges[END_Y + i] - y;
     const double length = std::sqrt(dx * dx + dy * dy);
     const double nx = dy / length, ny = -dx / length;  // outward: corners run clockwise with y down

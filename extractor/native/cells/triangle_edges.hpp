@@ -13,24 +13,24 @@ struct TriangleEdgeLimits {
   std::int64_t half_profile = 4;  // samples on each side of an edge. Chosen.
   // from profiles to the last row and column; more than half a sub-pixel step. Derived.
   double border_margin_px = 0.01;
-  // half length of a profile, in vectors from the cell's center to the edge's middle. Chosen.
+  // half length of a profile, in vectors from the cell's centre to the edge's middle. Chosen.
   double profile_reach = 0.5;
-  // in units of the corner's distance from the center; a triangle of which a corner moves farther is measured
+  // in units of the corner's distance from the centre; a triangle of which a corner moves farther is measured
   // again. Chosen: sharp cells move by 0.06, those of 6 px across by 0.15.
   double settled_shift = 0.1;
   std::int64_t max_passes = 2;  // Measured: rule "settled triangles".
-  // of the disc in which the ink's color is measured, relative to the corner's distance from the center.
+  // of the disc in which the ink's color is measured, relative to the corner's distance from the centre.
   // Chosen.
   double ink_radius = 0.2;
-  // of the disc of the color outside an edge, in vectors from the cell's center to the edge's middle.
+  // of the disc of the color outside an edge, in vectors from the cell's centre to the edge's middle.
   // Derived: the middle of a neighbour as large.
   double background_place = 2.0;
-  double background_radius = 0.4;  // of this disc, relative to the edge's distance from the center. Chosen.
-  double min_depth_px = 0.3;       // distance of a valid edge from the cell's center. Chosen.
+  double background_radius = 0.4;  // of this disc, relative to the edge's distance from the centre. Chosen.
+  double min_depth_px = 0.3;       // distance of a valid edge from the cell's centre. Chosen.
   // norm over the three 8-bit channels, between the ink and the color outside a valid edge. Chosen.
   double min_contrast = 12.0;
   double min_sine = 0.05;  // two edges that meet at less than 3 degrees have no corner. Chosen.
-  // of a valid triangle, in units of the corner's distance from the center. Chosen.
+  // of a valid triangle, in units of the corner's distance from the centre. Chosen.
   double max_corner_shift = 1.0;
   // to which a profile's share of ink is limited. Chosen.
   double min_profile_level = -0.2, max_profile_level = 1.2;

@@ -77,12 +77,12 @@ struct CellValues {
   std::array<Index, COLORS> count{};
   Index clipped = 0;  // colored cells
 
-  CellValues(View<const std::uint8_t, 3> image, View<const double, 2> center,
+  CellValues(View<const std::uint8_t, 3> image, View<const double, 2> centre,
              View<const std::uint8_t, 1> color, double radius, double clipped_value)
-      : values({COLORS, CHANNELS, center.size()}) {
+      : values({COLORS, CHANNELS, centre.size()}) {
     auto buffers = numeric::allocate_sample_buffers();
-    for (Index first = 0; first < center.size(); first += BATCH_POINTS) {
-      const auto points = center.slice(first, std::min(first + BATCH_POINTS, center.size()));
+    for (Index first = 0; first < centre.size(); first += BATCH_POINTS) {
+      const auto points = centre.slice(first, std::min(first + BATCH_POINTS, centre.size()));
       const auto patches = buffers.patches.view();
       for (Index i = 0; i < points.size(); ++i) {
         patches[numeric::X + i] = points(i, 0);
@@ -148,7 +148,7 @@ double evenness(const CellValues& cells, const std::array<Lights, COLORS>& media
 }
 
 // (K, 2) the means of the markers (M, 2) at the corners (K, 3).
-Array<double, 2> centers(View<const double, 2> xy, View<const std::int32_t, 2> corners) {
+Array<double, 2> centres(View<const double, 2> xy, View<const std::int32_t, 2> corners) {
   Array<double, 2> out({corners.size(), 2});
   for (Index i = 0; i < corners.size(); ++i) {
     const Index a = corners(i, 0), b = corners(i, 1), c = corners(i, 2);
@@ -159,10 +159,10 @@ Array<double, 2> centers(View<const double, 2> xy, View<const std::int32_t, 2> c
 
 // Contrast, the two inks that differ least, clipping and evenness at the middles of cells (K, 2) px; NaN
 // where unknown.
-CellFigures measure_cells(const image::PyramidLevel& view, View<const double, 2> center,
+CellFigures measure_cells(const image::PyramidLevel& view, View<const double, 2> centre,
                           View<const std::uint8_t, 1> color, double edge_px, const QualityLimits& limits) {
   const auto light = view.response.light;
-  const CellValues cells(view.image, center, color, limits.sample_radius * edge_px, limits.clipped_value);
+  const CellValues cells(view.image, centre, color, limits.sample_radius * edge_px, limits.clipped_value);
   if (cells.colored() == 0) return {NOT_A_NUMBER, 0, 0, NOT_A_NUMBER, NOT_A_NUMBER};
   const auto median = cells.median_light(light);
   const auto [contrast, one, other] = least_contrast(median);
@@ -178,8 +178,8 @@ std::tuple<CellFigures, double, double> measure_numbered(const image::PyramidLev
                                                          const QualityLimits& limits) {
   const double edge_px = refine::median_edge(xy, edges, limits.gridlines);
   const double noise = image::estimate_noise(view.image, xy, cells.corners, limits.noise);
-  const Array<double, 2> center = centers(xy, cells.corners);
-  return {measure_cells(view, center, cells.color, edge_px, limits), noise, edge_px};
+  const Array<double, 2> centre = centres(xy, cells.corners);
+  return {measure_cells(view, centre, cells.color, edge_px, limits), noise, edge_px};
 }
 
 }  // namespace cmp::complete

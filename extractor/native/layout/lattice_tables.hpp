@@ -12,14 +12,14 @@ inline constexpr std::int32_t UNKNOWN_AXIAL = -(1 << 20);
 // The layout's U colored cells.
 struct LayoutCells {
   static constexpr bool is_lasting = true;  // read once, as base/binding.hpp says
-  View<const double, 2> center_mm;          // (U, 2) layout frame
+  View<const double, 2> centre_mm;          // (U, 2) layout frame
   View<const std::uint8_t, 1> ink;          // (U,) 1 red, 2 green, 3 blue
   View<const double, 1> size_mm;            // (U,) the mean side
-  View<const double, 3> corner_vectors_mm;  // (U, 3, 2) from the center to the corners
+  View<const double, 3> corner_vectors_mm;  // (U, 3, 2) from the centre to the corners
   View<const std::int32_t, 2>
       cell_neighbours;  // (U, 6) cells that share a corner, by NEIGHBOUR_STEPS; -1 for none
 
-  CMP_FIELDS(center_mm, ink, size_mm, corner_vectors_mm, cell_neighbours)
+  CMP_FIELDS(centre_mm, ink, size_mm, corner_vectors_mm, cell_neighbours)
 };
 
 // The neighbours of the layout's M markers; -1 for no neighbour.

@@ -77,7 +77,7 @@ class LocalMap {
         const double spread = 0.5 * min_spread * (along + pivot + factor_[2][1] * factor_[2][1]);
         if (!(along * pivot > spread * spread)) return false;
       }
-      if (!(pivot > LEAST_PIVOT)) return false;
+      if (!(pivot > MIN_PIVOT)) return false;
       factor_[a][a] = std::sqrt(pivot);
     }
     for (int axis = 0; axis < 2; ++axis) {
@@ -119,7 +119,7 @@ class LocalMap {
 
  private:
   static constexpr Index FIRST_CURVED = 3, MIXED = 4, FIRST_CUBIC = 6;
-  static constexpr double LEAST_PIVOT = 1e-7;  // squared edges
+  static constexpr double MIN_PIVOT = 1e-7;  // squared edges
 
   Terms lower_solution(Terms x) const {
     for (Index a = 0; a < TERMS; ++a) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr Index CLASSES = 3, SIDES = 3;
 constexpr double NOWHERE = std::numeric_limits<double>::quiet_NaN();
-constexpr double LEAST_ODDS = -12.5;  // five standard deviations
+constexpr double MIN_ODDS = -12.5;  // five standard deviations
 constexpr Index NEIGHBOURS[6][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};  // of a down-cell
 
 // The light of a value between two whole ones.
@@ -155,8 +155,8 @@ class DownCells {
     for (const Step& step : steps) {
       const auto sum =
           sums_[(cells.axial(i, 0) + step.dq - low_q_) * columns_ + cells.axial(i, 1) + step.dr - low_r_];
-      sum[X] += step.weight * (cells.center_px(i, 0) + step.q * basis.ux + step.r * basis.vx);
-      sum[Y] += step.weight * (cells.center_px(i, 1) + step.q * basis.uy + step.r * basis.vy);
+      sum[X] += step.weight * (cells.centre_px(i, 0) + step.q * basis.ux + step.r * basis.vx);
+      sum[Y] += step.weight * (cells.centre_px(i, 1) + step.q * basis.uy + step.r * basis.vy);
       sum[WEIGHT] += step.weight;
     }
   }
@@ -207,8 +207,8 @@ Array<double, 2> odds_of(const std::vector<ColorField>& fields, View<const doubl
     }
     // relative to the likeliest class: a color that fits none says nothing
     const double most = std::max({odds(i, 0), odds(i, 1), odds(i, 2)});
-    const bool is_known = most > LEAST_ODDS;
-    for (Index k = 0; k < CLASSES; ++k) odds(i, k) = is_known ? std::max(odds(i, k) - most, LEAST_ODDS) : 0.0;
+    const bool is_known = most > MIN_ODDS;
+    for (Index k = 0; k < CLASSES; ++k) odds(i, k) = is_known ? std::max(odds(i, k) - most, MIN_ODDS) : 0.0;
   }
   return odds;
 }
@@ -217,7 +217,7 @@ double distance(const Color& a, const Color& b) {
   return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
 }
 
-// From a down-cell's center to those of the up-cells that share its sides, in steps of the lattice; its
+// From a down-cell's centre to those of the up-cells that share its sides, in steps of the lattice; its
 // corners lie on the other sides.
 constexpr double THIRD = 1.0 / 3.0;
 constexpr double SIDE_STEPS[SIDES][2] = {{2 * THIRD, -THIRD}, {-THIRD, -THIRD}, {-THIRD, 2 * THIRD}};
@@ -314,8 +314,8 @@ double fit_of(const std::vector<ColorField>& fields, const WalkedCells& cells,
   double count = 0.0, alike = 0.0;
   for (const Index i : members) {
     if (!std::isfinite(light[i][0])) continue;
-    const Color field = fields[class_of({cells.axial(i, 0), cells.axial(i, 1)})].at(cells.center_px(i, 0),
-                                                                                    cells.center_px(i, 1));
+    const Color field = fields[class_of({cells.axial(i, 0), cells.axial(i, 1)})].at(cells.centre_px(i, 0),
+                                                                                    cells.centre_px(i, 1));
     count += 1.0;
     alike += distance(light[i], field) < limits.likeness * distance(field, {});
   }
@@ -330,16 +330,16 @@ std::vector<Color> as_colors(View<const double, 2> light) {
 
 }  // namespace
 
-Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 2> center,
+Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 2> centre,
                             View<const double, 3> corner) {
-  const Index count = center.size();
+  const Index count = centre.size();
   Array<double, 2> xy({(1 + SIDES) * count, 2}), out({count, CHANNELS}, NOWHERE);
   for (Index i = 0; i < count; ++i)
     for (Index k = 0; k <= SIDES; ++k)
       for (int axis = 0; axis < 2; ++axis)
         // the neighbour across a side lies opposite to a corner, at the same distance
         xy((1 + SIDES) * i + k, axis) =
-            k == 0 ? center(i, axis) : 2.0 * center(i, axis) - corner(i, k - 1, axis);
+            k == 0 ? centre(i, axis) : 2.0 * centre(i, axis) - corner(i, k - 1, axis);
   const auto shown = light_at_points(view, xy);
   std::vector<Color> beside;
   for (Index i = 0; i < count; ++i) {
@@ -366,7 +366,7 @@ InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, 
   }
   std::vector<ColorField> fields;
   for (const auto& own : of_class)
-    fields.emplace_back(cells.center_px, light, own,
+    fields.emplace_back(cells.centre_px, light, own,
                         FieldLimits{limits.residual_scale, limits.robust_rounds, limits.quadratic_cells,
                                     limits.linear_cells});
   const DownCells down(cells, members, limits);
@@ -376,8 +376,8 @@ InkFields ink_fields(const image::PyramidLevel& view, const WalkedCells& cells, 
     axial(n, 1) = static_cast<std::int32_t>(down.r(n));
   }
   auto [whiteness, is_triangle] = DownLight(view, down, fields, limits).whiteness();
-  return {shares_of(fields, cells.center_px, members, limits),
-          odds_of(fields, cells.center_px, light, limits),
+  return {shares_of(fields, cells.centre_px, members, limits),
+          odds_of(fields, cells.centre_px, light, limits),
           std::move(axial),
           std::move(whiteness),
           std::move(is_triangle),

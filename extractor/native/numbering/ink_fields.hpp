@@ -20,13 +20,13 @@ struct InkFieldLimits {
   double least_share = 0.02;
   double least_scatter = 0.15;  // of a field's light, the least scatter of cells. Chosen.
   double bright = 0.6;          // whiteness of a down-cell that is not black. Chosen.
-  // share of the way from its center to its corners, up to which a white cell is white. Chosen: beyond it is
+  // share of the way from its centre to its corners, up to which a white cell is white. Chosen: beyond it is
   // blurred.
   double towards_corner = 0.55;
-  // share of the way from its center to those of the cells beside it, from which on these are not white.
+  // share of the way from its centre to those of the cells beside it, from which on these are not white.
   // Chosen: the side lies at a half.
   double across_side = 0.78;
-  double corner_likeness = 0.5;  // of the light of the center, the largest difference there. Chosen.
+  double corner_likeness = 0.5;  // of the light of the centre, the largest difference there. Chosen.
   // of a field's light, the largest difference of a cell that is like it. Chosen.
   double likeness = 0.5;
   std::int64_t robust_rounds = 4;  // fits of a field, the first ones of lower degrees. Chosen.
@@ -36,18 +36,18 @@ struct InkFieldLimits {
 
 // The N cells of an image, walked: the cells of one part have axial coordinates of one frame.
 struct WalkedCells {
-  View<const double, 2> center_px;    // (N, 2) at full scale
+  View<const double, 2> centre_px;    // (N, 2) at full scale
   View<const double, 3> corner_px;    // (N, 3, 2) counter-clockwise as seen from the pattern's front
   View<const std::int32_t, 2> axial;  // (N, 2)
   View<const std::int8_t, 1> first;   // (N,) the corner that is corner 0
   View<const std::int32_t, 1> part;   // (N,) the part, or -1
 
-  CMP_FIELDS(center_px, corner_px, axial, first, part)
+  CMP_FIELDS(centre_px, corner_px, axial, first, part)
 };
 
 // (N, 3) the light (B, G, R, units of 1/255) of cells over that of the black cells that share their sides;
-// NaN where one of these places is outside the image. center (N, 2), corner (N, 3, 2) without swelling.
-Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 2> center,
+// NaN where one of these places is outside the image. centre (N, 2), corner (N, 3, 2) without swelling.
+Array<double, 2> cell_light(const image::PyramidLevel& view, View<const double, 2> centre,
                             View<const double, 3> corner);
 
 // The colors around one part; the Python class explains them.

@@ -7,7 +7,7 @@ namespace cmp::numbering {
 
 // Lengths are in edges; a term of degree k has the unit edge per edge^k.
 struct MapPriorLimits {
-  double noise = 0.08;      // standard deviation of a cell's center. Chosen.
+  double noise = 0.08;      // standard deviation of a cell's centre. Chosen.
   double quadratic = 0.05;  // of the terms of degree 2. Chosen.
   double cubic = 0.01;      // of the terms of degree 3. Chosen.
 

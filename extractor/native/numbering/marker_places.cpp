@@ -19,7 +19,7 @@ using Triangle = std::array<PlanePoint, 3>;
 
 // The N cells of the image with their local maps.
 struct MappedCells {
-  View<const double, 2> center_px;   // (N, 2)
+  View<const double, 2> centre_px;   // (N, 2)
   View<const double, 3> corner_px;   // (N, 3, 2) of the triangles, clockwise
   View<const double, 3> slope;       // (N, 2, 2) px per mm, NaN where unknown
   View<const std::int32_t, 1> cell;  // (N,) the layout's cell, or -1
@@ -79,16 +79,16 @@ TriangleFit fit_triangle(const Triangle& triangle, const Triangle& corner, int c
   return {best, misfit[best] < limit * limit};
 }
 
-// The corners of cell i by its map; vectors_mm (U, 3, 2) from the layout's centers to the corners.
+// The corners of cell i by its map; vectors_mm (U, 3, 2) from the layout's centres to the corners.
 Triangle predicted_triangle(const MappedCells& cells, Index i, View<const double, 3> vectors_mm) {
-  const auto center = cells.center_px;
+  const auto centre = cells.centre_px;
   const auto slope = cells.slope;
   const std::int32_t u = cells.cell[i];
   Triangle out;
   for (int k = 0; k < 3; ++k) {
     const double x = vectors_mm(u, k, 0), y = vectors_mm(u, k, 1);
-    out[k] = {center(i, 0) + (slope(i, 0, 0) * x + slope(i, 0, 1) * y),
-              center(i, 1) + (slope(i, 1, 0) * x + slope(i, 1, 1) * y)};
+    out[k] = {centre(i, 0) + (slope(i, 0, 0) * x + slope(i, 0, 1) * y),
+              centre(i, 1) + (slope(i, 1, 0) * x + slope(i, 1, 1) * y)};
   }
   return out;
 }
@@ -101,7 +101,7 @@ void fill_slope(const Map& map, View<double, 2> out) {
     for (int k = 0; k < 2; ++k) out(axis, k) = map.coefficients(axis)[k + 1];
 }
 
-// The linear maps around numbered cells, through their centers.
+// The linear maps around numbered cells, through their centres.
 class CellMaps {
  public:
   CellMaps(const TriangularCells& cells, const CellNumbers& numbers, const layout::LayoutCells& layout,
@@ -111,7 +111,7 @@ class CellMaps {
         corner_step_(numbers.mirrored ? 1 : 2),
         layout_(layout),
         limits_(limits),
-        image_cell_({layout.center_mm.size()}, -1) {
+        image_cell_({layout.centre_mm.size()}, -1) {
     for (Index i = 0; i < cell_.size(); ++i)
       if (cell_[i] >= 0) image_cell_[cell_[i]] = static_cast<std::int32_t>(i);
   }
@@ -127,8 +127,8 @@ class CellMaps {
       if (cell_[i] < 0) continue;
       Map map = empty_map(i);
       for_neighbours(i, [&](std::int32_t v, Index j) {
-        map.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), cells_.center_px(j, 0),
-                cells_.center_px(j, 1));
+        map.add(layout_.centre_mm(v, 0), layout_.centre_mm(v, 1), cells_.centre_px(j, 0),
+                cells_.centre_px(j, 1));
       });
       if (map.solve(PINNED, limits_.min_spread))
         fill_slope(map, out.view()[i]);
@@ -143,8 +143,8 @@ class CellMaps {
 
   Map empty_map(Index i) const {
     const std::int32_t u = cell_[i];
-    return Map({layout_.center_mm(u, 0), layout_.center_mm(u, 1), 1.0, cells_.center_px(i, 0),
-                cells_.center_px(i, 1), 1.0});
+    return Map({layout_.centre_mm(u, 0), layout_.centre_mm(u, 1), 1.0, cells_.centre_px(i, 0),
+                cells_.centre_px(i, 1), 1.0});
   }
   template <class Visit>
   void for_neighbours(Index i, Visit visit) const {
@@ -157,8 +157,8 @@ class CellMaps {
     for (int k = 0; k < 3; ++k) {
       const std::int32_t u = cell_[i];
       const Index corner = (first + corner_step_ * k) % 3;
-      map.add(layout_.center_mm(u, 0) + layout_.corner_vectors_mm(u, k, 0),
-              layout_.center_mm(u, 1) + layout_.corner_vectors_mm(u, k, 1), cells_.corner_px(i, corner, 0),
+      map.add(layout_.centre_mm(u, 0) + layout_.corner_vectors_mm(u, k, 0),
+              layout_.centre_mm(u, 1) + layout_.corner_vectors_mm(u, k, 1), cells_.corner_px(i, corner, 0),
               cells_.corner_px(i, corner, 1));
     }
     map.solve(PINNED, 0.0);
@@ -168,10 +168,10 @@ class CellMaps {
   double misfit_of(Index i, const Map& map) const {
     double misfit = 0.0;
     for_neighbours(i, [&](std::int32_t v, Index j) {
-      const double x = cells_.center_px(j, 0), y = cells_.center_px(j, 1);
-      const auto [px, py] = map.at(layout_.center_mm(v, 0), layout_.center_mm(v, 1));
+      const double x = cells_.centre_px(j, 0), y = cells_.centre_px(j, 1);
+      const auto [px, py] = map.at(layout_.centre_mm(v, 0), layout_.centre_mm(v, 1));
       misfit = std::max(misfit, std::hypot(px - x, py - y) /
-                                    std::hypot(x - cells_.center_px(i, 0), y - cells_.center_px(i, 1)));
+                                    std::hypot(x - cells_.centre_px(i, 0), y - cells_.centre_px(i, 1)));
     });
     return misfit;
   }
@@ -232,7 +232,7 @@ Array<std::int64_t, 1> count_agreeing(const CellCorners& corners, View<const dou
 
 // The corners of the cells with a slope.
 //
-// vectors_mm (U, 3, 2) from the layout's centers to the corners; corner_ids (U, 3), their markers.
+// vectors_mm (U, 3, 2) from the layout's centres to the corners; corner_ids (U, 3), their markers.
 CellCorners cell_corners(const MappedCells& cells, View<const double, 3> vectors_mm,
                          View<const std::int32_t, 2> corner_ids, const CornerLimits& limits) {
   Array<Index, 1> here({cells.slope.size()});
@@ -271,7 +271,7 @@ InitialMarkers merge_corners(const TriangularCells& cells, const CellNumbers& nu
                              Index markers, const CornerLimits& limits) {
   const Array<double, 3> slope = CellMaps(cells, numbers, layout, limits).slopes();
   const CellCorners corners =
-      cell_corners({cells.center_px, cells.corner_px, slope, numbers.cell, numbers.mirrored},
+      cell_corners({cells.centre_px, cells.corner_px, slope, numbers.cell, numbers.mirrored},
                    layout.corner_vectors_mm, corner_ids, limits);
   const auto sums = corner_sums(corners, markers, limits.predicted_weight);
   Array<double, 2> xy({markers, 2}, NOWHERE);

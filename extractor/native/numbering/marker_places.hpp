@@ -25,7 +25,7 @@ struct CornerLimits {
   double predicted_weight = 0.05;
   // least ratio of a cell's neighbours' spread across to along; below it they lie on one line. Chosen.
   double min_spread = 0.2;
-  // of the distance to a neighbour, from its center to the prediction by the cell's triangle. Measured: rule
+  // of the distance to a neighbour, from its centre to the prediction by the cell's triangle. Measured: rule
   // "mapped by triangle".
   double max_triangle_misfit = 0.3;
   // the same for the triangle rotated by 120 degrees, which mispredicts by 1.7 distances. Chosen below that.
@@ -34,11 +34,11 @@ struct CornerLimits {
 
 // The N cells of the image.
 struct TriangularCells {
-  View<const double, 2> center_px;  // (N, 2)
+  View<const double, 2> centre_px;  // (N, 2)
   View<const double, 3>
       corner_px;  // (N, 3, 2) of the triangles, clockwise; NaN where the region is no triangle
 
-  CMP_FIELDS(center_px, corner_px)
+  CMP_FIELDS(centre_px, corner_px)
 };
 
 // The numbers of these cells.

@@ -35,7 +35,7 @@ std::vector<std::int32_t> known_around(std::int32_t u, View<const std::int32_t, 
 
 }  // namespace
 
-std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const double, 2> center,
+std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const double, 2> centre,
                                                                    View<const std::int32_t, 1> cell,
                                                                    const layout::LayoutCells& layout,
                                                                    const MissingCellLimits& limits) {
@@ -50,16 +50,16 @@ std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const do
     const auto known = known_around(static_cast<std::int32_t>(u), image_cell, layout, limits.min_neighbours);
     if (known.empty()) continue;
     const Index first = image_cell[known[0]];
-    const double x_mm = layout.center_mm(known[0], 0), y_mm = layout.center_mm(known[0], 1);
-    localmap::LocalMap<3> map({x_mm, y_mm, layout.size_mm[u], center(first, 0), center(first, 1), 1.0});
+    const double x_mm = layout.centre_mm(known[0], 0), y_mm = layout.centre_mm(known[0], 1);
+    localmap::LocalMap<3> map({x_mm, y_mm, layout.size_mm[u], centre(first, 0), centre(first, 1), 1.0});
     for (const std::int32_t v : known)
-      map.add(layout.center_mm(v, 0), layout.center_mm(v, 1), center(image_cell[v], 0),
-              center(image_cell[v], 1));
+      map.add(layout.centre_mm(v, 0), layout.centre_mm(v, 1), centre(image_cell[v], 0),
+              centre(image_cell[v], 1));
     if (known.size() < 3 || !map.solve(limits.prior.ridge(1.0), MIN_SPREAD)) continue;
     found.push_back(static_cast<std::int32_t>(u));
     for (int k = 0; k < 3; ++k) {
-      for (const double place : map.at(layout.center_mm(u, 0) + layout.corner_vectors_mm(u, k, 0),
-                                       layout.center_mm(u, 1) + layout.corner_vectors_mm(u, k, 1)))
+      for (const double place : map.at(layout.centre_mm(u, 0) + layout.corner_vectors_mm(u, k, 0),
+                                       layout.centre_mm(u, 1) + layout.corner_vectors_mm(u, k, 1)))
         corners.push_back(place);
     }
   }

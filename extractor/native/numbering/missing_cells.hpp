@@ -20,8 +20,8 @@ struct MissingCellLimits {
 // The layout's cells (K,) without a cell of the image that have enough neighbours with one, and their corners
 // (K, 3, 2) px, in the layout's order.
 //
-// center (N, 2) and cell (N,) of the image's cells; layout, the layout's cells.
-std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const double, 2> center,
+// centre (N, 2) and cell (N,) of the image's cells; layout, the layout's cells.
+std::tuple<Array<std::int32_t, 1>, Array<double, 3>> missing_cells(View<const double, 2> centre,
                                                                    View<const std::int32_t, 1> cell,
                                                                    const layout::LayoutCells& layout,
                                                                    const MissingCellLimits& limits);

@@ -25,7 +25,7 @@ class PlacedCells {
       if (cell[i] >= 0) of_image_.push_back(i);
     xy_ = Array<double, 2>({static_cast<Index>(of_image_.size()), 2});
     for (std::size_t n = 0; n < of_image_.size(); ++n) {
-      xy_(n, 0) = cells.center_px(of_image_[n], 0), xy_(n, 1) = cells.center_px(of_image_[n], 1);
+      xy_(n, 0) = cells.centre_px(of_image_[n], 0), xy_(n, 1) = cells.centre_px(of_image_[n], 1);
       of_layout_.push_back(cell[of_image_[n]]);
     }
     if (!of_image_.empty()) grid_.emplace(numeric::bucket_grid(xy_));
@@ -107,8 +107,8 @@ class Attachment {
   }
 
  private:
-  double x(Index i) const { return cells_.center_px(i, 0); }
-  double y(Index i) const { return cells_.center_px(i, 1); }
+  double x(Index i) const { return cells_.centre_px(i, 0); }
+  double y(Index i) const { return cells_.centre_px(i, 1); }
 
   // Places parts, or single cells, beside the placed ones, the nearest first; returns whether any was placed.
   bool place_some(bool is_single) {
@@ -183,13 +183,13 @@ class Attachment {
     const auto near = placed.nearest(x(i), y(i), limits_.known_cells);
     const Index u = placed.of_layout(near[0]);
     const double edge_px = edge_of(placed.of_image(near[0]));
-    const MapFrame frame{layout_.center_mm(u, 0), layout_.center_mm(u, 1), layout_.size_mm[u],
+    const MapFrame frame{layout_.centre_mm(u, 0), layout_.centre_mm(u, 1), layout_.size_mm[u],
                          placed.x(near[0]),       placed.y(near[0]),       edge_px};
     Support out{Map(frame), Map(frame), edge_px, 0.0, static_cast<std::int32_t>(u)};
     for (const Index n : near) {
       const Index v = placed.of_layout(n);
-      out.map.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
-      out.stiff.add(layout_.center_mm(v, 0), layout_.center_mm(v, 1), placed.x(n), placed.y(n));
+      out.map.add(layout_.centre_mm(v, 0), layout_.centre_mm(v, 1), placed.x(n), placed.y(n));
+      out.stiff.add(layout_.centre_mm(v, 0), layout_.centre_mm(v, 1), placed.x(n), placed.y(n));
     }
     if (near.size() < 3 || !out.map.solve(limits_.prior.ridge(1.0), MIN_SPREAD) ||
         !out.stiff.solve(limits_.prior.ridge(limits_.stiffness), MIN_SPREAD))
@@ -229,13 +229,13 @@ class Attachment {
   }
   // In edges, how far around a place of the map others are tried.
   double reach_at(const Support& support, std::int32_t u) const {
-    const double leverage = support.map.leverage(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
+    const double leverage = support.map.leverage(layout_.centre_mm(u, 0), layout_.centre_mm(u, 1));
     return std::min(limits_.reach,
                     1.0 + limits_.reach_deviations * limits_.prior.noise * std::sqrt(1.0 + leverage));
   }
   // From the place of a layout's cell by the stiff map to a cell of the image, in edges.
   double distance_to(const Support& support, std::int32_t u, Index i) const {
-    const auto [px, py] = support.stiff.at(layout_.center_mm(u, 0), layout_.center_mm(u, 1));
+    const auto [px, py] = support.stiff.at(layout_.centre_mm(u, 0), layout_.centre_mm(u, 1));
     return std::hypot(px - x(i), py - y(i)) / support.edge_px;
   }
   Motion motion_to(Index i, std::int32_t u, std::int32_t turn) const {
@@ -258,7 +258,7 @@ class Attachment {
     for (const Index i : judged) {
       const std::int32_t u = moved(i, motion);
       if (u < 0 || is_taken_[u]) continue;
-      map.add(layout_.center_mm(u, 0), layout_.center_mm(u, 1), x(i), y(i));
+      map.add(layout_.centre_mm(u, 0), layout_.centre_mm(u, 1), x(i), y(i));
       score += odds_(i, layout_.ink[u] - 1);
     }
     if (!map.solve(limits_.prior.ridge(1.0), MIN_SPREAD)) return -1e9;
@@ -272,8 +272,8 @@ class Attachment {
   bool is_pointing(Index i, std::int32_t u, const Map& map, double edge_px) const {
     std::array<double, 6> expected;
     for (int k = 0; k < 3; ++k) {
-      const auto [px, py] = map.at(layout_.center_mm(u, 0) + layout_.corner_vectors_mm(u, k, 0),
-                                   layout_.center_mm(u, 1) + layout_.corner_vectors_mm(u, k, 1));
+      const auto [px, py] = map.at(layout_.centre_mm(u, 0) + layout_.corner_vectors_mm(u, k, 0),
+                                   layout_.centre_mm(u, 1) + layout_.corner_vectors_mm(u, k, 1));
       expected[2 * k] = px - x(i), expected[2 * k + 1] = py - y(i);
     }
     for (int first = 0; first < 3; ++first) {

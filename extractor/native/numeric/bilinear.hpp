@@ -14,7 +14,7 @@ inline constexpr int SUBPIXEL_STEPS = 256;  // per pixel
 inline constexpr double BORDER_PX =
     1.0 + 1e-6;  // distance of the last sample from the image's width or height
 inline constexpr int HEXAGON_COUNT = 7;
-// The center and the corners of a hexagon of radius 1.
+// The centre and the corners of a hexagon of radius 1.
 inline constexpr double HEXAGON_POINTS[HEXAGON_COUNT][2] = {{0.0, 0.0},
                                                             {1.0, 0.0},
                                                             {0.5, 0.8660254037844386},

@@ -13,7 +13,7 @@ void add_track(nb::module_ module) {
   bind<&check_cells>(module, "check_cells", {"image", "xy", "tables", "before", "compare"});
   bind<&measure_shifts>(module, "measure_shifts", {"image", "xy", "tables", "levels"});
   bind<&update_shifts_and_move_markers>(module, "update_shifts_and_move_markers", {"xy", "shift", "corners"});
-  bind<&count_matching_centers>(module, "count_matching_centers", {"image", "xy", "tables", "levels"});
+  bind<&count_matching_centres>(module, "count_matching_centres", {"image", "xy", "tables", "levels"});
   bind<&connected_cells>(module, "connected_cells",
                          {"verdict", "first", "known", "corners", "cells_of_marker"});
   bind<&verified_markers>(module, "verified_markers", {"xy", "proved", "corners"});

@@ -35,7 +35,7 @@ bool has_own_ink(const std::array<double, 3>& color, Index i, const WarmTables& 
 
 }  // namespace
 
-VisibleCells count_matching_centers(View<const std::uint8_t, 3> image, View<const double, 2> xy,
+VisibleCells count_matching_centres(View<const std::uint8_t, 3> image, View<const double, 2> xy,
                                     const WarmTables& tables, View<const double, 2> levels,
                                     const WarmStartLimits& limits) {
   const auto flat = image.flat();
@@ -48,9 +48,9 @@ VisibleCells count_matching_centers(View<const std::uint8_t, 3> image, View<cons
     const auto a = xy[corners[0]], b = xy[corners[1]], c = xy[corners[2]];
     const double x = (a[0] + b[0] + c[0]) / 3, y = (a[1] + b[1] + c[1]) / 3;
     // outside the image, or NaN
-    if (!numeric::fill_patch_mean(flat, height, width, x, y, limits.center_radius_px, color_view)) continue;
+    if (!numeric::fill_patch_mean(flat, height, width, x, y, limits.centre_radius_px, color_view)) continue;
     ++visible;
-    matching += has_own_ink(color, i, tables, levels, limits.min_center_strength);
+    matching += has_own_ink(color, i, tables, levels, limits.min_centre_strength);
   }
   return {visible, matching};
 }

@@ -10,9 +10,9 @@ namespace cmp::track {
 
 // Limits of the proof.
 struct WarmStartLimits {
-  double center_radius_px = 0.5;  // of the disc over which a middle's color is averaged. Chosen.
+  double centre_radius_px = 0.5;  // of the disc over which a middle's color is averaged. Chosen.
   // of a middle's ink level, relative to the frame before, for the middle to show its ink. Chosen.
-  double min_center_strength = 0.3;
+  double min_centre_strength = 0.3;
   double min_verified_share = 0.95;  // of the cells in view that the image must confirm. Chosen.
 };
 
@@ -31,7 +31,7 @@ struct VisibleCells {
 };
 
 // image (H, W, 3) BGR; xy (M, 2) markers, NaN where not predicted; levels (C, 3) ink levels over black.
-VisibleCells count_matching_centers(View<const std::uint8_t, 3> image, View<const double, 2> xy,
+VisibleCells count_matching_centres(View<const std::uint8_t, 3> image, View<const double, 2> xy,
                                     const WarmTables& tables, View<const double, 2> levels,
                                     const WarmStartLimits& limits);
 

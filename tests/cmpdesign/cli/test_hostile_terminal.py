@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cmpdesign.cli.terminal import MOST_LINE_LETTERS, error_on_one_line
+from cmpdesign.cli.terminal import MAX_LINE_LETTERS, error_on_one_line
 from cmpdesign.design.templates import templates_folder
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.texts import visible
@@ -32,7 +32,7 @@ def clean(*arguments: object, code: int | None = None) -> str:
     assert all(letter.isprintable() for line in printed.split("\n") for letter in line), ascii(printed)
     for line in result.stderr.splitlines():
         if line.startswith(("error: ", "warning: ")):
-            assert len(line) <= MOST_LINE_LETTERS + len("warning: ")
+            assert len(line) <= MAX_LINE_LETTERS + len("warning: ")
     if code is not None:
         assert result.exit_code == code, printed
     return printed
@@ -44,13 +44,13 @@ def test_any_text_becomes_visible(text: str) -> None:
     shown = visible(text)
     assert shown.isprintable() and (shown == text) == text.isprintable()
     line = error_on_one_line(CmpDesignError(text * 40))
-    assert line.isprintable() and len(line) <= MOST_LINE_LETTERS
+    assert line.isprintable() and len(line) <= MAX_LINE_LETTERS
 
 
 def test_a_long_line_keeps_its_remedy() -> None:
     line = error_on_one_line(CmpDesignError(f"out.toml: {'x' * 10_000} is too long; make it shorter"))
     assert line.startswith("out.toml: xxx") and line.endswith("; make it shorter")
-    assert len(line) == MOST_LINE_LETTERS
+    assert len(line) == MAX_LINE_LETTERS
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.force.__main__ import LEAST_N, read_case
+from benchmarks.force.__main__ import MIN_N, read_case
 from benchmarks.force.truth import TRUTH, cases
 
 NARROW = ("ring", "two balls")  # narrower than the distance of two loads
@@ -20,7 +20,7 @@ def test_forces_torques_and_regions_of_finite_element_frames_and_their_deviation
         if case.thickness_mm == 4.0 and case.poisson == 0.5:
             mine = np.flatnonzero(truth["case"] == case.name)
             frames = [{key: values[k] for key, values in truth.items()} for k in mine]
-            read = [one for one in read_case(case, frames, random) if one.press_n > LEAST_N]
+            read = [one for one in read_case(case, frames, random) if one.press_n > MIN_N]
             found += read
             tested += [] if case.fitted else read
     assert len(found) >= 30

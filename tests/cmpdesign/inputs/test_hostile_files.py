@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from cmpdesign.cli.terminal import MOST_LINE_LETTERS, error_on_one_line
+from cmpdesign.cli.terminal import MAX_LINE_LETTERS, error_on_one_line
 from cmpdesign.errors import CmpDesignError
 from extractor import ExtractorError
 from tests.support.hostile.input_files import DATA, DOCUMENTS, EVERY, LEFT, InputFile, as_text, toml
@@ -57,7 +57,7 @@ def answer(kind: InputFile, path: Path) -> str | None:
             kind.read(path)
     except EXPECTED as error:
         line = error_on_one_line(error)
-        assert line.isprintable() and 0 < len(line) <= MOST_LINE_LETTERS
+        assert line.isprintable() and 0 < len(line) <= MAX_LINE_LETTERS
         return line
     return None
 

@@ -46,7 +46,7 @@ class Windows:
         rows = []
         for marker in np.flatnonzero(plain.marker_layer <= layers - radius):
             inside = cells[is_in_hexagon(centre[cells] - place[marker], radius)]
-            # The window is turned until its red cell at the center has the direction 0.
+            # The window is turned until its red cell at the centre has the direction 0.
             towards_red = centre[red[np.abs(centre[red] - place[marker]).argmin()]] - place[marker]
             turned = np.round((centre[inside] - place[marker]) / towards_red, 6) + 0.0
             rows.append(inside[np.lexsort([turned.imag, turned.real])])
@@ -61,7 +61,7 @@ class Windows:
 
 
 def is_in_hexagon(offset: NDArray[np.complex128], radius: int) -> NDArray[np.bool_]:
-    """Whether cells' centers lie in a hexagon with corners at the distance ``radius``, at 0, 60, ... degrees."""
+    """Whether cells' centres lie in a hexagon with corners at the distance ``radius``, at 0, 60, ... degrees."""
     normals = np.exp(1j * np.radians(30 + 60 * np.arange(6)))
     return np.asarray((np.real(offset[:, None] * normals.conj()) < radius * np.sqrt(3) / 2).all(axis=1))
 

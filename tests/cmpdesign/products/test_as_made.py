@@ -23,7 +23,7 @@ from cmpdesign.reading.read_layout import read_layout
 from tests.support.command import run
 from tests.support.made.seen_pads import SeenCell, SeenPad, carved_pad, cast_pad, read_seen
 
-LEAST_SHARE, RMS_PITCHES, WORST_PITCHES = 0.99, 0.005, 0.02
+MIN_SHARE, RMS_PITCHES, WORST_PITCHES = 0.99, 0.005, 0.02
 TRIANGULAR = ("digit", "elliptical", "gelsight-mini", "honeycomb", "round", "tac3d")
 
 
@@ -56,7 +56,7 @@ def carved_cells(folder: Path, layout: Layout) -> list[SeenCell]:
 
 def require_as_designed(layout: Layout, pad: SeenPad) -> None:
     assert pad.mirrored == layout.mirrored
-    assert pad.share >= LEAST_SHARE
+    assert pad.share >= MIN_SHARE
     assert pad.rms <= RMS_PITCHES and pad.worst <= WORST_PITCHES
 
 

@@ -29,7 +29,7 @@ from cmpdesign.products.laser.coupon.design import coupon_to_json, design_coupon
 from cmpdesign.products.laser.grid.design import design_grid
 from cmpdesign.products.laser.setup import complete_setup
 from cmpdesign.studio.app import PAGE, make_app
-from cmpdesign.studio.builds import MOST_RUNNING, Builds
+from cmpdesign.studio.builds import MAX_RUNNING, Builds
 from cmpdesign.studio.guard import Door
 from cmpdesign.studio.live import LiveFeed
 from cmpdesign.studio.serving import serve
@@ -185,9 +185,9 @@ def test_refusals_in_words(page: TestClient) -> None:
 
 def test_builds_are_few_and_private_and_leave_nothing() -> None:
     builds, design = Builds(), cmpdesign.Design(**FIELDS)
-    running = [builds.start(design, ["layout"], (640, 480)) for _ in range(MOST_RUNNING)]
+    running = [builds.start(design, ["layout"], (640, 480)) for _ in range(MAX_RUNNING)]
     folders = [build.folder for build in running]
-    with pytest.raises(CmpDesignError, match=f"{MOST_RUNNING} builds run already"):
+    with pytest.raises(CmpDesignError, match=f"{MAX_RUNNING} builds run already"):
         builds.start(design, ["layout"], (640, 480))
     assert all(folder.stat().st_mode & 0o077 == 0 for folder in folders)
     running[0].cancel()

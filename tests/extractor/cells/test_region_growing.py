@@ -33,8 +33,8 @@ def view_of(image: Image) -> PyramidLevel:
 def cells_at(xy: list[tuple[float, float]], area_px: float) -> Cells:
     """Seeds at places (x, y) with a stated area; growing reads nothing else."""
     count = len(xy)
-    center = np.array(xy, np.float64).reshape(count, 2)
-    return Cells(center, np.full(count, area_px), np.zeros((count, 3, 2)), np.zeros(count), np.zeros(count))
+    centre = np.array(xy, np.float64).reshape(count, 2)
+    return Cells(centre, np.full(count, area_px), np.zeros((count, 3, 2)), np.zeros(count), np.zeros(count))
 
 
 def plain_growing(hsv: Image, seed: tuple[int, int], taken: NDArray[np.bool_]) -> NDArray[np.bool_]:

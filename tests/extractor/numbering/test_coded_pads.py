@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.suites.views.views import DAMAGED, View, read_view
+from benchmarks.suites.views.views import DAMAGED, DrawnView, read_view
 from cmpdesign.design.design import Design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
@@ -30,7 +30,7 @@ def reader(code: int) -> Extractor:
 
 
 def crop(code: int, turn_deg: float, *blobs: Blob) -> Rendered:
-    """A part of a pad beside its center: the reference cell is outside the picture, and so is the outline."""
+    """A part of a pad beside its centre: the reference cell is outside the picture, and so is the outline."""
     camera = Camera(41.0, turn_deg, tilt_deg=5.0, centre_px=(305.0, 215.0))
     scene = Scene(
         pad(code), camera, optics=Optics(1.0), sensor=Sensor(noise=2.0), damage=Damage(blobs=blobs), seed=3
@@ -81,7 +81,7 @@ def test_a_plain_layout_does_not_number_a_coded_pad() -> None:
 @pytest.mark.parametrize("number", [34, 142])
 def test_bits_of_several_parts_prove_a_motion_together(number: int) -> None:
     """Covers cut these crops in parts of less than 50 cells, and no part has bits enough."""
-    result = read_view(View(DAMAGED, 7302, number, CODE, (40.0, 72.0)))
+    result = read_view(DrawnView(DAMAGED, 7302, number, CODE, (40.0, 72.0)))
     assert 60 <= result.black_cells < 70 and result.reported > 100 and result.wrong_ids == 0
 
 

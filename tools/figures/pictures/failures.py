@@ -61,7 +61,7 @@ def failures() -> tuple[Failure, ...]:
     makers: dict[Reason, Callable[[], Picture]] = {
         Reason.NO_COLOR: gray,
         Reason.NO_PATTERN: out_of_focus,
-        Reason.REFERENCE_LOST: covered_center,
+        Reason.REFERENCE_LOST: covered_centre,
         Reason.AMBIGUOUS: two_bright_drops,
         Reason.SEVERAL_PADS: two_pads,
         Reason.OTHER_CODE: another_code,
@@ -97,7 +97,7 @@ def out_of_focus() -> Picture:
     return view(pitch_px=6.0, optics=Optics(4.0))
 
 
-def covered_center() -> Picture:
+def covered_centre() -> Picture:
     """Dirt over the white cell, and half of the pad beyond the picture: neither cell nor outline is seen."""
     return view(pitch_px=34.0, damage=Damage(blobs=(Blob((0.0, 0.8), 1.6, (60.0, 70.0, 80.0)),)))
 
@@ -105,9 +105,9 @@ def covered_center() -> Picture:
 def two_bright_drops() -> Picture:
     """Drops on two black cells, the white cell under dirt, and a ring of dirt that hides the rim."""
     layout = pattern()
-    centers_mm = layout.marker_xy_mm[layout.cell_corners].mean(axis=1)
-    black_mm = centers_mm[layout.cell_color == BLACK]
-    white_mm = centers_mm[layout.cell_color == WHITE][0]
+    centres_mm = layout.marker_xy_mm[layout.cell_corners].mean(axis=1)
+    black_mm = centres_mm[layout.cell_color == BLACK]
+    white_mm = centres_mm[layout.cell_color == WHITE][0]
     places = (white_mm + (1.5, -2.6), white_mm + (-1.5, -2.6))
     drops = tuple(
         Blob(tuple(black_mm[np.linalg.norm(black_mm - place, axis=1).argmin()]), 0.4, (240.0, 240.0, 240.0))

@@ -28,10 +28,10 @@ OWN = 4
 # Places and weights that average over the width of a pixel.
 PIXEL_PLACES, PIXEL_WEIGHTS = np.array([-0.3873, 0.0, 0.3873]), np.array([5.0, 8.0, 5.0]) / 18
 # Blur, as a deviation in px, that is expected at least; the rise from 0.1 to 0.9 of a Gaussian edge.
-LEAST_BLUR_PX, RISE_SIGMA = 0.35, 2.563
+MIN_BLUR_PX, RISE_SIGMA = 0.35, 2.563
 STEPS, ENOUGH = 80, 0.01
 # Deviation of one pixel's value, at least: steps of 1 are rounded.
-LEAST_NOISE = 0.3
+MIN_NOISE = 0.3
 # The fitted exponent stays within these, relative to the response.
 SMALLEST_EXPONENT, LARGEST_EXPONENT = 0.3, 3.0
 
@@ -143,7 +143,7 @@ class EdgeModel:
         smooth = np.convolve(share[order], kernel, "valid")
         place = np.convolve(from_edge[order], kernel, "valid")
         rise = place[np.argmax(smooth > 0.9)] - place[len(smooth) - 1 - np.argmax(smooth[::-1] < 0.1)]
-        blur_px = max(float(rise) / RISE_SIGMA, LEAST_BLUR_PX)
+        blur_px = max(float(rise) / RISE_SIGMA, MIN_BLUR_PX)
         return EdgeState(levels[0], levels[1], place_px, zeros, blur_px, SHAPE_START, float(np.log(exponent)))
 
     def _system(self, state: EdgeState, free_exponent: bool) -> _System:
@@ -287,7 +287,7 @@ def bin_deviations(edges: EdgeValues, residual: Values | None = None) -> Values:
     together = (edges.edge[1:] == edges.edge[:-1]) & (edges.distance_px[1:] * edges.distance_px[:-1] > 0)
     pair = far[1:] & far[:-1] & together
     scaled = np.diff(edges.value) / np.sqrt(1 / edges.pixels[1:] + 1 / edges.pixels[:-1])
-    noise = max(float(np.sqrt(np.mean(scaled[pair] ** 2))), LEAST_NOISE)
+    noise = max(float(np.sqrt(np.mean(scaled[pair] ** 2))), MIN_NOISE)
     variance = noise**2 / edges.pixels
     if residual is not None:
         variance = variance + max(float(np.mean(residual**2 - variance)), 0.0)

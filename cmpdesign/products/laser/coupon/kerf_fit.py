@@ -12,7 +12,7 @@ from cmpdesign.products.laser.coupon.openings import BANDS, OpeningProfile
 from cmpdesign.products.laser.coupon.picture import Values
 
 # Deviation of the map's scale over the coupon in units of the fiducials' misfit over the coupon's size, and its least.
-SCALE_FACTOR, LEAST_SCALE = 3.0, 2e-4
+SCALE_FACTOR, MIN_SCALE = 3.0, 2e-4
 # Deviation of a slot's excess light, which is taken from the square of its patch, as a share.
 EXCESS_DEVIATION = 0.003
 
@@ -28,7 +28,7 @@ class KerfFit:
 def scale_deviation(coupon: Coupon, fit_mm: float) -> float:
     """The relative deviation of lengths by the map, from the misfit of the fiducials."""
     size = float(np.ptp(np.array(coupon.fiducials_mm), axis=0).max())
-    return float(np.hypot(SCALE_FACTOR * fit_mm / size, LEAST_SCALE))
+    return float(np.hypot(SCALE_FACTOR * fit_mm / size, MIN_SCALE))
 
 
 def fit_kerfs(profiles: Sequence[OpeningProfile], along_x: bool, deviation: float) -> KerfFit:

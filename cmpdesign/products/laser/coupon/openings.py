@@ -26,7 +26,7 @@ WIDE_MM, INNER_MM = 1.5, 0.5
 BANDS = 8
 SPACING_PX = 0.5
 # Least difference of light (0 to 255) between an opening and the sheet.
-LEAST_CONTRAST = 8.0
+MIN_CONTRAST = 8.0
 # Standard deviation of the illumination's fit, as a share of the light, and of its terms over the coupon's size.
 LIGHT_DEVIATION, TERM_DEVIATION = 0.004, 0.3
 
@@ -148,10 +148,10 @@ def _raw_profile(across: Across, picture: CouponPicture) -> _RawProfile:
     own = np.zeros_like(light)
     if across.wide:
         own = _line(light, place, np.abs(place) < across.width_mm / 2 - INNER_MM) - sheet
-        if np.abs(own).min() < LEAST_CONTRAST:
+        if np.abs(own).min() < MIN_CONTRAST:
             raise PhotoError(
                 f"an opening at ({across.opening.x_mm:g}, {across.opening.y_mm:g}) mm differs from the sheet by "
-                f"{np.abs(own).min():.0f} of 255 in light, limit {LEAST_CONTRAST:g}; light the sheet evenly and put a "
+                f"{np.abs(own).min():.0f} of 255 in light, limit {MIN_CONTRAST:g}; light the sheet evenly and put a "
                 "dark or bright ground behind it"
             )
     return _RawProfile(across, place, light, sheet, own)

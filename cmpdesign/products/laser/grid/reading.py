@@ -34,7 +34,7 @@ MARKED_SIGMAS = 4.0
 # A window is clear of its own outline and of the next window within these distances, mm.
 CLEAR_MM, RIM_MM = 0.6, 0.35
 # Least difference of light (0 to 255) between ground and sheet.
-LEAST_CONTRAST = 20.0
+MIN_CONTRAST = 20.0
 SAMPLES = 15
 
 
@@ -162,10 +162,10 @@ def _state(patch: Patch, picture: CouponPicture, ground: float) -> WindowState:
     centre, half = np.array([window.x_mm, window.y_mm]), np.array([window.width_mm, window.height_mm]) / 2
     sheet = picture.sample(centre + _ring(half + APART_MM / 2))
     level, scatter = float(np.median(sheet)), float(np.std(sheet))
-    if abs(ground - level) < LEAST_CONTRAST:
+    if abs(ground - level) < MIN_CONTRAST:
         raise PhotoError(
             f"window {patch.name}: ground and sheet differ by {abs(ground - level):.0f} of 255 in light, limit "
-            f"{LEAST_CONTRAST:g}; put a much darker or brighter ground behind the piece"
+            f"{MIN_CONTRAST:g}; put a much darker or brighter ground behind the piece"
         )
     place = np.linspace(-1, 1, SAMPLES)
     grid = np.stack(np.meshgrid(place, place), axis=-1).reshape(-1, 2)

@@ -17,10 +17,10 @@ from cmpdesign.products.mold.solids.slab_shells import TILE_MARGIN_MM
 from cmpdesign.products.mold.stack.stack import MoldStack
 
 # Least wall between two features of a part.
-LEAST_WALL_MM = 0.3
-LEAST_STENCIL_WEB_MM, LEAST_MOAT_MM = 0.01, 0.1
+MIN_WALL_MM = 0.3
+MIN_STENCIL_WEB_MM, MIN_MOAT_MM = 0.01, 0.1
 # Least diameter of a pin between its chamfers.
-LEAST_PIN_TIP_MM = 0.4
+MIN_PIN_TIP_MM = 0.4
 PINS, JACKS, VENTS, PAD = "a pin hole", "a jack screw's hole", "a vent", "the pad's opening"
 CELLS, EDGE = "the cells", "the outer edge"
 # The change to make, by a feature of the pair; the first change that applies.
@@ -40,7 +40,7 @@ class PlanFeature(NamedTuple):
 
 
 def clearance_findings(stack: MoldStack) -> Iterator[Finding]:
-    """Errors where two features of a part overlap or leave less than ``LEAST_WALL_MM``; one for each kind of pair."""
+    """Errors where two features of a part overlap or leave less than ``MIN_WALL_MM``; one for each kind of pair."""
     for part, features in _features_by_part(stack).items():
         least: dict[tuple[str, str], float] = {}
         for first, second in combinations(features, 2):
@@ -48,25 +48,25 @@ def clearance_findings(stack: MoldStack) -> Iterator[Finding]:
             distance = _distance_mm(first.shape, second.shape)
             least[pair] = min(distance, least.get(pair, distance))
         for (one, other), distance in least.items():
-            if distance < LEAST_WALL_MM:
+            if distance < MIN_WALL_MM:
                 remedy = next(text for name, text in REMEDIES.items() if name in (one, other))
                 named = f"{one} and another" if one == other else f"{one} and {other}"
                 subject = f"wall between {named} in {part}"
-                yield Finding(subject, distance, LEAST_WALL_MM, "mm", remedy, "error")
+                yield Finding(subject, distance, MIN_WALL_MM, "mm", remedy, "error")
     yield from _stencil_findings(stack)
     yield from _size_findings(stack)
 
 
 def _size_findings(stack: MoldStack) -> Iterator[Finding]:
     tip = stack.pin_diameter_mm - 2 * PIN_CHAMFER_MM
-    if tip < LEAST_PIN_TIP_MM:
+    if tip < MIN_PIN_TIP_MM:
         remedy = "make mold.pin_diameter_mm (or fiducials.diameter_mm) larger"
-        yield Finding("diameter of a pin between its chamfers", tip, LEAST_PIN_TIP_MM, "mm", remedy, "error")
+        yield Finding("diameter of a pin between its chamfers", tip, MIN_PIN_TIP_MM, "mm", remedy, "error")
     option = stack.options
     moat = option.moat_mm - 2 * stack.lean * option.moat_depth_mm
-    if moat < LEAST_MOAT_MM:
+    if moat < MIN_MOAT_MM:
         remedy = "make mold.moat_mm larger, or mold.moat_depth_mm or mold.draft_deg smaller"
-        yield Finding("width of the moat at its floor", moat, LEAST_MOAT_MM, "mm", remedy, "error")
+        yield Finding("width of the moat at its floor", moat, MIN_MOAT_MM, "mm", remedy, "error")
     width = min(float(np.ptp(stack.edges(layer)[0].points, axis=0).min()) for layer in (0, 2))
     if stack.options.vents and width < 3 * stack.options.vent_mm:
         remedy = "make mold.vent_mm smaller, or mold.vents 0"
@@ -90,12 +90,12 @@ def _stencil_findings(stack: MoldStack) -> Iterator[Finding]:
             # On a dome every hole lies in a separate facet.
             widest = float(open_insets(stack, color).min()) + stack.options.clearance_mm
             least = min(least, 2 * (widest - STENCIL_LEAN * stack.options.stencil_mm))
-    if least < LEAST_STENCIL_WEB_MM:
+    if least < MIN_STENCIL_WEB_MM:
         remedy = "make mold.stencil_mm smaller or mold.clearance_mm larger"
         yield Finding(
             "wall between two holes of a stencil's upper face",
             least,
-            LEAST_STENCIL_WEB_MM,
+            MIN_STENCIL_WEB_MM,
             "mm",
             remedy,
             "error",

@@ -12,7 +12,7 @@ from cmpdesign.errors import DesignError
 from cmpdesign.layout.checks import Finding
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.products.materials.silicones import load_silicone, silicones
-from cmpdesign.products.mold.checks.clearances import LEAST_WALL_MM, clearance_findings
+from cmpdesign.products.mold.checks.clearances import MIN_WALL_MM, clearance_findings
 from cmpdesign.products.mold.shapes.bosses import boss_features
 from cmpdesign.products.mold.shapes.cavities import cavities, open_insets, seen_inset_mm
 from cmpdesign.products.mold.solids.loops import Points, frusta_volume_mm3
@@ -275,9 +275,9 @@ def _shape_findings(stack: MoldStack) -> Iterator[Finding]:
         subject = "corners of a cell on a crown (four are in no plane)"
         yield Finding(subject, 4, 3, "", remedy, "error", is_measure=False)
     wall = moat_to_pin_mm(stack)
-    if wall < LEAST_WALL_MM:
+    if wall < MIN_WALL_MM:
         remedy = "make fiducials.gap_mm larger, or mold.parting_mm or mold.moat_mm smaller"
-        yield Finding("wall between the moat and a pin hole", wall, LEAST_WALL_MM, "mm", remedy, "error")
+        yield Finding("wall between the moat and a pin hole", wall, MIN_WALL_MM, "mm", remedy, "error")
     if option.moat_depth_mm > stack.z_base_mm + option.floor_mm - 1:
         limit = stack.z_base_mm + option.floor_mm - 1
         yield Finding("mold.moat_depth_mm", option.moat_depth_mm, limit, "mm", "make it less deep", "error")
