@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from cmpdesign.api.pictures import Verifier as Verifier
     from cmpdesign.api.pictures import load_scene as load_scene
     from cmpdesign.api.pictures import render as render
-    from cmpdesign.api.pictures import render_sequence as render_sequence
     from cmpdesign.api.pictures import verify as verify
     from cmpdesign.api.plots import plot_displacement as plot_displacement
     from cmpdesign.api.plots import plot_history as plot_history
@@ -147,7 +146,6 @@ _HOMES = {
     "reconstruct": "cmpdesign.api.sequences",
     "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
-    "render_sequence": "cmpdesign.api.pictures",
     "schema": "cmpdesign.api.making",
     "size": "cmpdesign.proposal.camera_design",
     "templates": "cmpdesign.api.making",

@@ -21,7 +21,7 @@ import typer
 
 from cmpdesign.cli.mode import current_mode
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.inputs.texts import visible
+from cmpdesign.inputs.texts import one_line, shortened, visible
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,18 +30,7 @@ if TYPE_CHECKING:
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
-# Of an error or a warning: no message of the program is as long; only texts from files and arguments can be longer.
-MAX_LINE_LETTERS = 1000
-_HEAD_LETTERS = 700  # letters before the cut; the remedy stands at the end of a line
 _STARTED = time.perf_counter()
-
-
-def shortened(text: str) -> str:
-    """The text, cut in the middle at ``MAX_LINE_LETTERS``."""
-    if len(text) <= MAX_LINE_LETTERS:
-        return text
-    gap = " ... "
-    return text[:_HEAD_LETTERS] + gap + text[len(text) - (MAX_LINE_LETTERS - _HEAD_LETTERS - len(gap)) :]
 
 
 def console(stderr: bool = False) -> Console:
@@ -65,14 +54,9 @@ def is_expected(error: BaseException) -> bool:
     return isinstance(error, CmpDesignError)
 
 
-def error_on_one_line(error: BaseException | str) -> str:
-    """The error's message: one line of printable characters, at most ``MAX_LINE_LETTERS``."""
-    return shortened(visible(" ".join(str(error).split())))
-
-
 def print_error(error: BaseException | str, exit_code: int = EXIT_BAD_INPUT) -> None:
     """Print an error on stderr."""
-    _print_message("error", error_on_one_line(error), exit_code=exit_code)
+    _print_message("error", one_line(error), exit_code=exit_code)
 
 
 def print_warning(text: str) -> None:
