@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.options import Preset, Written
@@ -13,9 +13,16 @@ from cmpdesign.products.registry import USUAL_NAMES, chosen_products
 if TYPE_CHECKING:
     from cmpdesign.api.designs import Design
     from cmpdesign.design.design import Design as Parameters
-    from cmpdesign.documents.designs import BuildDocument, CheckDocument, InitDocument
+    from cmpdesign.documents.designs import (
+        BuildDocument,
+        CheckDocument,
+        InitDocument,
+        TemplateDocument,
+        TemplatesDocument,
+    )
 
 CAMERA_PX = (640, 480)
+TemplateKind = Literal["designs", "scenes", "plans", "machines", "materials", "silicones", "sensors"]
 
 
 def build(
@@ -172,20 +179,46 @@ def _sensor_text(file: Path, layout: Path, cameras: Sequence[Path]) -> str:
     return text
 
 
-def schema() -> dict[str, Any]:
-    """The JSON Schema of a design's TOML file, for editors, as the command ``schema`` prints it."""
-    from cmpdesign.design.design import design_schema
+def schema(command: str = "") -> dict[str, Any]:
+    """The JSON Schema of a design's TOML file, for editors, or of the document that a command prints with ``--json``.
 
-    return design_schema()
+    Args:
+        command: words of a command, as "evaluate designs"; "message": the lines on stderr; empty: a design's TOML file.
 
-
-def templates() -> dict[str, Design]:
-    """The design templates by name, as the command ``templates`` lists them.
-
-    >>> templates()["tac3d"].layers
-    10
+    Raises:
+        CmpDesignError: no such command.
     """
-    from cmpdesign.api.designs import load
-    from cmpdesign.design import templates as shipped
+    from cmpdesign.design.design import design_schema
+    from cmpdesign.documents.registry import document_schema
 
-    return {name: load(name) for name in shipped.templates()}
+    return document_schema(command) if command else design_schema()
+
+
+def templates(
+    kind: TemplateKind | None = None, show: Annotated[str | None, Written(metavar="NAME")] = None
+) -> TemplatesDocument | TemplateDocument:
+    """List or show the templates.
+
+    >>> [one.name for one in cmpdesign.templates("scenes").templates]
+
+    Args:
+        kind: list templates of one kind; None: all.
+        show: print the TOML file of a template; as "sensors/tac3d" where two kinds share a name.
+
+    Raises:
+        DesignError: no such template.
+    """
+    from cmpdesign.design.templates import find_template, template_kinds, template_words
+    from cmpdesign.documents.designs import TemplateDocument, TemplatesDocument
+    from cmpdesign.inputs.files import read_text
+
+    if show is not None:
+        found, path = find_template(show if kind is None or "/" in show else f"{kind}/{show}")
+        return TemplateDocument(kind=found, name=path.stem, text=read_text(path))
+    listed = [
+        {"kind": each, "name": name, **template_words(path)._asdict()}
+        for each, names in template_kinds().items()
+        if kind in (None, each)
+        for name, path in names.items()
+    ]
+    return TemplatesDocument.model_validate({"templates": listed})

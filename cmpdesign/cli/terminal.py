@@ -12,10 +12,10 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
@@ -108,6 +108,25 @@ def say_table(rows: Mapping[str, str]) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     say(table)
+
+
+def say_columns(headings: Sequence[str], rows: Iterable[Sequence[str]], *, folds: bool = False) -> None:
+    """Print a table for people.
+
+    Args:
+        headings: of the columns; one that begins with ">" is of numbers, on the right.
+        rows: a text for each column.
+        folds: lines that are longer than the terminal is wide fold within their column.
+    """
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for heading in headings:
+        justify: Literal["left", "right"] = "right" if heading.startswith(">") else "left"
+        table.add_column(heading.removeprefix(">"), justify=justify, overflow="fold" if folds else "ellipsis")
+    for row in rows:
+        table.add_row(*row)
+    say(table, soft_wrap=not folds)
 
 
 def say_text(text: str) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmpdesign.api import pictures
+from cmpdesign.api import verifying
 from cmpdesign.cli.derived import derived
 from cmpdesign.cli.options.images import SourcesArgument
 from cmpdesign.cli.progress import working
@@ -45,7 +45,7 @@ LayoutsArgument = Annotated[
 ]
 
 
-@derived(pictures.verify, layout=None, images=None, on_verdict=None)
+@derived(verifying.verify, layout=None, images=None, on_verdict=None)
 def verify(report: Path | None, *, layout: LayoutsArgument, images: SourcesArgument, **options: Any) -> None:
     """Many pictures, videos and cameras are read, too. Exit code: 0 verified, 1 not verified, 2 bad input."""
     layouts = [layout, *(Path(text) for text in takewhile(_is_layout, images))]
@@ -56,7 +56,9 @@ def verify(report: Path | None, *, layout: LayoutsArgument, images: SourcesArgum
         print_step(f"{name} judged")
 
     with working("verifying") as steps, watched(steps.tell):
-        done = pictures.verify(layouts, images[len(layouts) - 1 :], report=report, on_verdict=keep, **options)
+        done = verifying.verify(
+            layouts, images[len(layouts) - 1 :], report=report, on_verdict=keep, **options
+        )
     for image in done.images:
         if image.error is not None:
             print_error(image.error)

@@ -204,7 +204,9 @@ def test_render_draws_what_the_command_draws(design: cmpdesign.Design, tmp_path:
         assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.files)
     with pytest.raises(TypeError, match="pitch is no option; there are pitch_px"):
         cmpdesign.render(design.layout, pitch=25)  # type: ignore[call-arg]
-    with pytest.raises(cmpdesign.CmpDesignError, match=r"pitch_px cannot be given with scene; write \[camera\] pitch_px"):
+    with pytest.raises(
+        cmpdesign.CmpDesignError, match=r"pitch_px cannot be given with scene; write \[camera\] pitch_px"
+    ):
         cmpdesign.render(design.layout, "pressed-ball", pitch_px=25)
     with pytest.raises(cmpdesign.CmpDesignError, match="ending"):
         drawn.save(tmp_path / "c.gif", truth=tmp_path / "c.npz")
