@@ -8,18 +8,13 @@ namespace cmp {
 
 namespace {
 
-// The splines of the point spread; see `coverage_task.Spread`.
 struct Spread {
   Index oversampling, reach, degree;
   View<const float, 1> weights;
 
-  template <class F>
-  static Spread read(const F& f) {
-    return {f["oversampling"], f["reach"], f["degree"], f["weights"]};
-  }
+  CMP_RECORD("cmpdesign.scene.parts.optics.PointSpread", oversampling, reach, degree, weights)
 };
 
-// See `coverage_task.CoverageTask`.
 struct CoverageTask {
   View<const double, 2> segments;     // (S, 4) sides u0, v0, u1, v1 in samples
   View<const std::int64_t, 1> owner;  // (S,) the polygon of each side
@@ -28,10 +23,8 @@ struct CoverageTask {
   View<const double, 2> quadrature;  // (2, n) places and weights on a piece of a side
   Spread spread;
 
-  template <class F>
-  static CoverageTask read(const F& f) {
-    return {f["segments"], f["owner"], f["values"], f["columns"], f["width"], f["quadrature"], f["spread"]};
-  }
+  CMP_RECORD("cmpdesign.scene.drawing.coverage_task.CoverageTask", segments, owner, values, columns, width,
+             quadrature, spread)
 };
 
 constexpr int ALONG = 4,

@@ -34,13 +34,13 @@ from typer.testing import CliRunner
 
 from cmpdesign import demo
 from cmpdesign.cli import app
-from cmpdesign.cli.terminal import MAX_LINE_LETTERS
 from cmpdesign.contact.objects.heightmap import MAX_HEIGHTS
 from cmpdesign.design.design import Design
 from cmpdesign.design.templates import templates
 from cmpdesign.inputs import documents
 from cmpdesign.inputs import files as inputs
 from cmpdesign.inputs import names as lines
+from cmpdesign.inputs.texts import MAX_LINE_LETTERS
 from cmpdesign.patterns import registered_patterns
 from tests.docs.stand_ins import make_stand_in
 from tools.figures import everything, fields

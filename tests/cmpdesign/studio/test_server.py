@@ -205,7 +205,7 @@ def test_builds_are_few_and_private_and_leave_nothing() -> None:
 def test_a_picture_is_read_as_the_call_reads_it(page: TestClient) -> None:
     design = cmpdesign.Design(**FIELDS)
     image = cmpdesign.render(design.layout, pitch_px=30, rotation_deg=20, noise=1).image
-    expected = cmpdesign.verify(design.layout, image)
+    expected = cmpdesign.verify(design.layout, image).found
     query = {"fields": '{"pattern": "honeycomb", "layers": 3, "pitch_mm": "60mil"}', "name": "seen.png"}
     found = page.post("/api/readings", params=query, content=to_png(image)).json()
     assert found["verified"] and found["measured"] == expected.measured == len(found["ids"])
