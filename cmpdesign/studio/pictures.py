@@ -19,8 +19,6 @@ RESIDUAL_SIGMAS = 8.0  # of black and white in a picture of residuals
 _FITTED_PIXELS = 40_000  # from which the light of the inks is estimated
 _OUTLIER_SIGMAS = 4.0  # of a pixel that shows something else than the pattern
 _MEDIAN_TO_SIGMA = 1.4826  # of normal errors
-    5.0  # weight, in pixels, of a light that does not change over the image: an ink may have one cell only
-)
 _COVERED = 0.999  # share of a pixel that cells cover
 _POWERS = ((0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (2, 0))  # of y and x
 _PIXEL_VARIANCE = 1 / 12  # of a box
