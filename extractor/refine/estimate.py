@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import measure
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
-from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.marker_scatter import NO_SCATTER, MarkerScatter
+from extractor.refine.measure.marker_scatter import MarkerScatter
 from extractor.refine.relief import Parallax
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.ink_levels import InkLevels, level_change
@@ -97,56 +97,6 @@ class UnevenDotGain(NamedTuple):
     across: float
 
 
-EVEN = UnevenDotGain(0.0, 0.0)
-
-
-class Estimate(NamedTuple):
-    """The current estimate. Places are px in the image at the scale of the step. Compiled functions take a part of it.
-
-    Attributes:
-        xy: (M, 2) places at which the pattern is drawn. Markers that the image hardly shows or does not show
-            (``hidden``) lie at the places by the maps of their neighbours.
-        measured: (M, 2) all markers after the last step.
-        reliable: (M, 2) the same, NaN for markers that the image hardly shows.
-        hidden: (M,) bool.
-        maps: (M, 2, 5), as ``local_maps`` gives them.
-        sigma: the blur, px.
-        noise: gray levels, one channel.
-        levels: of the inks.
-        pixel_noise: as in ``Appearance``.
-        information: about the markers.
-        roughness: (M,) px^2, roughness of the markers around each marker.
-        bend_variance: (E,) px^2, variance of the gridlines' bending beyond the map.
-        bend: (E, 2) px, the bending.
-        weight: (E,) 0 to 1, of the gridlines in the last step; 1 before the first.
-        reading: gridlines and levels that the last step by synthesis compared with the image; None before the first.
-        dot_gain: distance by which the sides of all cells have moved outward, px.
-        uneven_dot_gain: its changes over the image.
-        scatter: of the markers, each by itself.
-        convergence_cov_px2: (M, 2, 2) covariance of the remaining error after the last step; None before it.
-    """
-
-    xy: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    reliable: NDArray[np.float64]
-    hidden: NDArray[np.bool_]
-    maps: NDArray[np.float64]
-    sigma: float
-    noise: float
-    levels: InkLevels
-    pixel_noise: float
-    information: Information
-    roughness: NDArray[np.float64]
-    bend_variance: NDArray[np.float64]
-    bend: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    reading: GridlineReading | None = None
-    dot_gain: float = 0.0
-    uneven_dot_gain: UnevenDotGain = EVEN
-    scatter: MarkerScatter = NO_SCATTER
-    convergence_cov_px2: NDArray[np.float64] | None = None
-
-
 class EdgeContrasts(NamedTuple):
     """The change of color across the gridlines; the change does not depend on shifts of a gridline by a pixel.
 
@@ -161,6 +111,75 @@ class EdgeContrasts(NamedTuple):
     clearance: NDArray[np.float64]
 
 
-def places_in_view(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
-    """Places of the full image in a reduced image."""
-    return places._replace(xy_px=view.to_level(places.xy_px), edge_px=places.edge_px / view.scale)
+class FirstEstimate(NamedTuple):
+    """The estimate of an image after the round of profiles. Places are px in the image at the scale of the round.
+
+    Attributes:
+        measured: (M, 2) all markers.
+        reliable: (M, 2) the same, NaN for markers that the image hardly shows.
+        bend: (E, 2) px, the bending of the gridlines.
+        information: about the markers.
+        weight: (E,) 0 to 1, of the gridlines.
+        sigma: the blur, px.
+        noise, pixel_noise, levels: as in ``Appearance``.
+        dot_gain: distance by which the sides of all cells have moved outward, px.
+        contrasts: across the gridlines.
+        places: the markers' places in the full image, outliers put where their neighbours predict them.
+    """
+
+    measured: NDArray[np.float64]
+    reliable: NDArray[np.float64]
+    bend: NDArray[np.float64]
+    information: Information
+    weight: NDArray[np.float64]
+    sigma: float
+    noise: float
+    pixel_noise: float
+    dot_gain: float
+    levels: InkLevels
+    contrasts: EdgeContrasts
+    places: InitialMarkers
+
+    def rescaled(self, old: PyramidLevel, view: PyramidLevel) -> FirstEstimate:
+        """The estimate of one level of an image in another level."""
+        ratio = old.scale / view.scale
+        # a pixel's own variance is a twelfth of its area
+        blur2 = (old.scale * self.sigma) ** 2 + (view.scale**2 - old.scale**2) / 12.0
+        shift = 0.5 * ratio - 0.5  # of a pixel's middle
+        blocks, clearance = self.information, self.contrasts.clearance.copy()
+        clearance[:, 0] *= ratio
+        return self._replace(
+            measured=ratio * self.measured + shift,
+            reliable=ratio * self.reliable + shift,
+            bend=ratio * self.bend,
+            information=Information(blocks.diagonal / ratio**2, blocks.off_diagonal / ratio**2),
+            sigma=max(float(np.sqrt(blur2)) / view.scale, measure.MIN_SIGMA_PX),
+            noise=max(ratio * self.noise, measure.MIN_NOISE),
+            pixel_noise=max(ratio * self.pixel_noise, measure.MIN_NOISE),
+            dot_gain=ratio * self.dot_gain,
+            levels=self.levels._replace(slope=self.levels.slope / ratio),
+            contrasts=self.contrasts._replace(clearance=clearance),
+        )
+
+
+class MeasuredImage(NamedTuple):
+    """The markers after the steps by synthesis, and what the image then shows.
+
+    Attributes:
+        xy_px, cov_px2, explained, points: as in ``RefinedMarkers``.
+        sigma: the blur, px at the scale of the steps.
+        noise, pixel_noise, levels: as in ``Appearance``.
+        uneven_dot_gain: changes of the dot gain over the image.
+        scatter: of the markers, at the scale of the steps.
+    """
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    explained: NDArray[np.bool_]
+    points: NDArray[np.float64]
+    sigma: float
+    noise: float
+    pixel_noise: float
+    levels: InkLevels
+    uneven_dot_gain: UnevenDotGain
+    scatter: MarkerScatter

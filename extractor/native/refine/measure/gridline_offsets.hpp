@@ -1,5 +1,10 @@
 // Offsets of the gridlines at virtual markers, measured where refinement last compared the image with the
 // pattern.
+//
+// Rounded corners, halos and inks whose response differs shift the sides of all cells alike, by an amount that
+// depends on the ink and on the place along the side: its profile. A profile is no shape of the surface, as
+// colored cells lie on alternate sides of the gridlines. The median profile of each ink over the picture is
+// removed from the offsets.
 #pragma once
 
 #include "base/array.hpp"
@@ -26,9 +31,6 @@ struct GridlineReading {
   View<const double, 1> dot_gain_offset;  // (E,) px, the shift of the gridline towards (-uy, ux) by dot gain
   double sigma;                           // px, the blur
   double noise;                           // gray levels
-
-  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, station_sums, weight,
-             variance_ratio, dot_gain_offset, sigma, noise)
 };
 
 // The offsets of the gridlines around their m virtual markers.
