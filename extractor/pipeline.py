@@ -297,7 +297,7 @@ class ImageReader:
         stages.record("repair", repaired)
 
         def virtual() -> VirtualMarkers:
-            points = refined.points
+            points = refined.points[:, : layout.virtual_per_edge]
             if parallax is not None:
                 points = points_without_parallax(parallax, topology.edges, apparent.xy_px, points)
             return locate_virtual_markers(topology, repaired, points, refined.scatter)

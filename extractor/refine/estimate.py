@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -58,6 +59,30 @@ class Appearance(NamedTuple):
         return blur and bool(level_change(other.levels.cell, self.levels.cell) < MAX_LEVEL_CHANGE)
 
 
+class GridlineReading(NamedTuple):
+    """The gridlines at the last comparison of the image with the pattern. Lengths are px at the scale of the step.
+
+    Attributes:
+        lines: (E, 8), as ``gridlines`` gives them.
+        contrasts: (E, 3) gray levels, differences of the values on both sides.
+        station_sums: (E, m, 2), of the pixels around each virtual marker, the weighted residual and the information.
+        weight: (E,) 0 to 1.
+        variance_ratio: (E,) of the variance along each gridline to that of noise.
+        dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
+        sigma: px, the blur.
+        noise: gray levels.
+    """
+
+    lines: NDArray[np.float64]
+    contrasts: NDArray[np.float64]
+    station_sums: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    variance_ratio: NDArray[np.float64]
+    dot_gain_offset: NDArray[np.float64]
+    sigma: float
+    noise: float
+
+
 @dataclass(frozen=True, eq=False)
 class RefinedMarkers:
     """Markers after refinement.
@@ -70,8 +95,7 @@ class RefinedMarkers:
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, gray levels, one channel.
         appearance: appearance of the image.
-        points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not
-            measured.
+        reading: the last comparison of the image with the pattern.
         scatter: of the markers, each by itself.
     """
 
@@ -81,8 +105,15 @@ class RefinedMarkers:
     blur_px: float
     noise: float
     appearance: Appearance
-    points: NDArray[np.float64]
+    reading: GridlineReading
     scatter: MarkerScatter
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """(E, m, 3) the virtual markers as measured, px, and their variance across the gridline, px^2, NaN where not
+        measured.
+        """
+        return measure.virtual_markers(self.reading, self.appearance.scale)
 
 
 class UnevenDotGain(NamedTuple):
@@ -166,7 +197,7 @@ class MeasuredImage(NamedTuple):
     """The markers after the steps by synthesis, and what the image then shows.
 
     Attributes:
-        xy_px, cov_px2, explained, points: as in ``RefinedMarkers``.
+        xy_px, cov_px2, explained, reading: as in ``RefinedMarkers``.
         sigma: the blur, px at the scale of the steps.
         noise, pixel_noise, levels: as in ``Appearance``.
         uneven_dot_gain: changes of the dot gain over the image.
@@ -176,7 +207,7 @@ class MeasuredImage(NamedTuple):
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     explained: NDArray[np.bool_]
-    points: NDArray[np.float64]
+    reading: GridlineReading
     sigma: float
     noise: float
     pixel_noise: float

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import measure
 from extractor._native import refine as native
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.layout.topology import Topology
@@ -37,7 +38,6 @@ class Refiner:
 
     def __init__(self, topology: Topology, preset: Preset, virtual_per_edge: int) -> None:
         self._topology = topology
-        self._virtual = virtual_per_edge
         self._schedule = SCHEDULES[preset]
         # points of each gridline at which drawing and image are compared, too
         self._stations = virtual_per_edge or (RELIEF_POINTS if topology.cell_height != 0.0 else 0)
@@ -112,9 +112,8 @@ class Refiner:
         scale = view.scale
         size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
         if self._topology.cell_height != 0.0:
-            parallax: Parallax | None = find_parallax(
-                self._topology, found.xy_px, found.points[..., :2], size_px
-            )
+            points = measure.virtual_markers(found.reading, scale)[..., :2]
+            parallax: Parallax | None = find_parallax(self._topology, found.xy_px, points, size_px)
         else:
             parallax = unknown_parallax(*found.uneven_dot_gain, size_px)
         look = found.sigma, found.noise, found.levels, found.pixel_noise
@@ -125,6 +124,6 @@ class Refiner:
             blur_px=scale * found.sigma,
             noise=scale * found.noise,
             appearance=Appearance(scale, *look, parallax),
-            points=found.points[:, : self._virtual],
+            reading=found.reading,
             scatter=found.scatter.at_scale(scale),
         )

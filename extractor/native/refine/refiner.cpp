@@ -69,14 +69,12 @@ MeasuredImage measure_image(const image::PyramidLevel& view, const layout::Topol
   const StartPlaces places{own.xy_px, own.edge_px, own.agreed, own.is_intact};
   Estimate after = synthesis_steps(view, topology, first, small_remainder, stations, limits.steps);
   FinalMarkers markers = accepted_or_recovered(view, topology, first, after, places, limits);
-  Array<double, 3> points =
-      virtual_markers(after.reading.lines, measure_offsets(view, after.reading, limits.offsets), scale);
   update_to_full_scale(markers, places, scale, limits.agreed_deviation);
   for (bool& explained : markers.unaccepted) explained = !explained;
   return {std::move(markers.xy_px),
           std::move(markers.cov_px2),
           std::move(markers.unaccepted),
-          std::move(points),
+          std::move(after.reading),
           after.sigma,
           after.noise,
           first.pixel_noise,

@@ -6,7 +6,6 @@
 #include "numbering/marker_places.hpp"
 #include "refine/acceptance.hpp"
 #include "refine/first_estimate.hpp"
-#include "refine/measure/gridline_offsets.hpp"
 #include "refine/recovered_markers.hpp"
 #include "refine/synthesis_steps.hpp"
 
@@ -19,7 +18,6 @@ struct RefinerLimits {
   StepsLimits steps;
   FinalLimits final;
   RecoveryLimits recovery;
-  OffsetLimits offsets;
 };
 
 // The markers at the image's full scale, and the appearance at the scale of the step; the Python class
@@ -28,13 +26,13 @@ struct MeasuredImage {
   Array<double, 2> xy_px;
   Array<double, 3> cov_px2;
   Array<bool, 1> explained;
-  Array<double, 3> points;
+  ReadGridlines reading;
   double sigma, noise, pixel_noise;
   LevelArrays levels;
   UnevenDotGain uneven_dot_gain;
   MarkerScatter scatter;
 
-  CMP_RECORD("extractor.refine.estimate.MeasuredImage", xy_px, cov_px2, explained, points, sigma, noise,
+  CMP_RECORD("extractor.refine.estimate.MeasuredImage", xy_px, cov_px2, explained, reading, sigma, noise,
              pixel_noise, levels, uneven_dot_gain, scatter)
 };
 

@@ -76,7 +76,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
   LevelArrays after = levels_at_blur(levels_of(corrected), state.xy, topology.cells, topology.cell_color,
                                      sigma, blur_px, limits.drawing.bleed);
   ReadGridlines reading{std::move(lines),
-                        std::move(sides),
+                        std::move(contrasts),
                         std::move(read.stations),
                         std::move(weighed.weight),
                         std::move(solved.variance_ratio),

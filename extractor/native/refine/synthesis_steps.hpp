@@ -24,14 +24,13 @@ struct SynthesisLimits {
 };
 
 struct ReadGridlines {
-  Array<double, 2> lines, sides;                             // (E, 8), (E, 6)
+  Array<double, 2> lines, contrasts;                         // (E, 8), (E, 3)
   Array<double, 3> station_sums;                             // (E, m, 2)
   Array<double, 1> weight, variance_ratio, dot_gain_offset;  // (E,)
   double sigma, noise;                                       // px; gray levels
 
-  operator GridlineReading() const {
-    return {lines, sides, station_sums, weight, variance_ratio, dot_gain_offset, sigma, noise};
-  }
+  CMP_RECORD("extractor.refine.estimate.GridlineReading", lines, contrasts, station_sums, weight,
+             variance_ratio, dot_gain_offset, sigma, noise)
 };
 
 struct SynthesisStep {
