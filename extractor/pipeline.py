@@ -1,7 +1,7 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
 Stages: image, seeds, grow, mesh, light, walk, number, triangles, place, refine, repair, virtual, quality. A warm
-start of the tracker goes from image over predict and prove to refine.
+start of the tracker goes from image over prove to refine.
 """
 
 from __future__ import annotations

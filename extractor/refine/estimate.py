@@ -44,12 +44,12 @@ class Appearance(NamedTuple):
         """The appearance in another light.
 
         Args:
-            before, now: (2, C, 3) light of some cells over black, and of their black, in the previous and in the
+            before, now: (2, 3) mean light of some cells over black, and of their black, in the previous and in the
                 present image.
         """
-        gain = now[0].sum(axis=0) / np.maximum(before[0].sum(axis=0), 1e-9)
+        gain = now[0] / np.maximum(before[0], 1e-9)
         black = self.levels.black.copy()
-        black[:, 0] += (now[1] - before[1]).mean(axis=0)
+        black[:, 0] += now[1] - before[1]
         cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
         return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
 

@@ -346,6 +346,11 @@ nb::object to_python(T&& record) {
   return nb::steal(object);
 }
 
+template <class T>
+nb::object to_python(std::optional<T>&& value) {
+  return value ? to_python(std::move(*value)) : nb::none();
+}
+
 template <class... T>
 nb::object to_python(std::tuple<T...>&& values) {
   return std::apply([](auto&&... value) { return nb::make_tuple(to_python(std::move(value))...); },

@@ -43,15 +43,6 @@ numbering::InitialMarkers corrected_places(const StartPlaces& places, CorrectedO
 
 }  // namespace
 
-Array<double, 2> to_level(View<const double, 2> xy_px, Index scale) {
-  Array<double, 2> out(xy_px.shape());
-  for (Index m = 0; m < xy_px.size(); ++m) {
-    for (Index axis = 0; axis < 2; ++axis)
-      out(m, axis) = (xy_px(m, axis) + 0.5) / static_cast<double>(scale) - 0.5;
-  }
-  return out;
-}
-
 FirstEstimateArrays first_estimate(const image::PyramidLevel& view, const layout::Topology& topology,
                                    View<const double, 2> start, const StartPlaces& places,
                                    const std::optional<KnownAppearance>& known, Index rows,
@@ -61,7 +52,7 @@ FirstEstimateArrays first_estimate(const image::PyramidLevel& view, const layout
   const double assumed = limits.default_sigma_px / scale;
   const auto& profiles = limits.profiles;
   const auto [xy, hidden, maps] =
-      extrapolate_pattern(to_level(start, view.scale), topology, profiles.step.gridlines);
+      extrapolate_pattern(view.to_level(start), topology, profiles.step.gridlines);
   auto [sigma, noise, pixel_noise, levels] =
       known ? known_look(*known) : first_look(view, topology, xy, assumed, limits.look);
   const Array<double, 2> straight({edges.size(), 2}, 0.0);

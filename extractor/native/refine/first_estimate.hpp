@@ -60,9 +60,6 @@ struct FirstEstimateArrays {
              noise, pixel_noise, dot_gain, levels, contrasts, places)
 };
 
-// Points (N, 2) px of the full image in an image that is reduced by `scale`.
-Array<double, 2> to_level(View<const double, 2> xy_px, Index scale);
-
 // The levels of the inks, the blur, and the round of profiles.
 //
 // start (M, 2) px in the full image, where the profiles are; places of the full image; rows of pixels across

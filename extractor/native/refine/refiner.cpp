@@ -12,7 +12,7 @@ namespace {
 numbering::InitialMarkers places_in_view(const image::PyramidLevel& view, const FirstEstimate& first,
                                          View<const std::int32_t, 2> cells, const DotGainLimits& limits) {
   const StartPlaces& places = first.places;
-  Array<double, 2> xy = to_level(places.xy_px, view.scale);
+  Array<double, 2> xy = view.to_level(places.xy_px);
   if (first.dot_gain != 0.0) xy = markers_without_dot_gain(xy, cells, first.dot_gain, limits);
   Array<double, 1> edge(places.edge_px);
   for (double& own : edge) own /= static_cast<double>(view.scale);
