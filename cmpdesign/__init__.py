@@ -51,11 +51,8 @@ if TYPE_CHECKING:
     from cmpdesign.api.making import init as init
     from cmpdesign.api.making import schema as schema
     from cmpdesign.api.making import templates as templates
-    from cmpdesign.api.pictures import Verifier as Verifier
     from cmpdesign.api.pictures import load_scene as load_scene
     from cmpdesign.api.pictures import render as render
-    from cmpdesign.api.pictures import render_sequence as render_sequence
-    from cmpdesign.api.pictures import verify as verify
     from cmpdesign.api.plots import plot_displacement as plot_displacement
     from cmpdesign.api.plots import plot_history as plot_history
     from cmpdesign.api.plots import plot_layout as plot_layout
@@ -66,6 +63,8 @@ if TYPE_CHECKING:
     from cmpdesign.api.sequences import reconstruct as reconstruct
     from cmpdesign.api.sequences import recover_run as recover_run
     from cmpdesign.api.sequences import track as track
+    from cmpdesign.api.verifying import Verifier as Verifier
+    from cmpdesign.api.verifying import verify as verify
     from cmpdesign.api.workshop import evaluate as evaluate
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
@@ -113,7 +112,7 @@ _HOMES = {
     "ShapeOptions": "cmpdesign.tracking.jobs.options",
     "TouchedError": "cmpdesign.runtime.zero",
     "TrackOptions": "cmpdesign.tracking.jobs.options",
-    "Verifier": "cmpdesign.api.pictures",
+    "Verifier": "cmpdesign.api.verifying",
     "build": "cmpdesign.api.making",
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
@@ -147,12 +146,11 @@ _HOMES = {
     "reconstruct": "cmpdesign.api.sequences",
     "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
-    "render_sequence": "cmpdesign.api.pictures",
     "schema": "cmpdesign.api.making",
     "size": "cmpdesign.proposal.camera_design",
     "templates": "cmpdesign.api.making",
     "track": "cmpdesign.api.sequences",
-    "verify": "cmpdesign.api.pictures",
+    "verify": "cmpdesign.api.verifying",
     "write_layout": "cmpdesign.files.layout_json",
     "write_svg": "cmpdesign.products.drawing.svg",
 }

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-SIZE, FRAMES, FPS = (640, 480), 30, 30
+SIZE, FRAMES, FPS, LAYERS = (640, 480), 30, 30, 10
 FIELD_OF_VIEW_DEG = 28.0
 _MEDIUM = "[medium]\ngel_mm = 4.0\ngel_index = 1.41\nwindow_mm = 2.0\nwindow_index = 1.49\n"
 _ELASTOMER = "thickness_mm = 5.0\nyoung_mpa = 0.2\nmarker_depth_mm = 1.0\n"
@@ -27,22 +27,20 @@ radius_mm = 8.0
 [contact.motion]
 press_mm = 0.0
 shear_mm = [0.0, 0.0]
-[sequence]
-frames = {FRAMES}
-fps = {FPS}
 [sequence.values]
 contact.motion.press_mm = [[0.0, 0.0], [0.7, 0.4]]
 contact.motion.shear_mm = [[0.5, [0, 0]], [1.0, [0.3, 0]]]
 """
 
 
-def write_touched_sensor(folder: Path) -> list[str]:
+def write_touched_sensor(folder: Path, frames: int = FRAMES, layers: int = LAYERS) -> list[str]:
     """Write layout, rig, gel and the frames of a press; returns the words of ``view`` but for its source.
 
-    The frames are ``frames/*.png`` of 640 x 480 px, a view in each half, at 30 frames a second.
+    The frames are ``frames/*.png`` of 640 x 480 px, a view in each half, over a second.
     """
     width, height = SIZE[0] // 2, SIZE[1]
     focal_px = 0.5 * width / math.tan(math.radians(0.5 * FIELD_OF_VIEW_DEG))
+    sequence = f"[sequence]\nframes = {frames}\nfps = {frames}\n"
     scene, rig = f"size_px = [{SIZE[0]}, {SIZE[1]}]\nseed = 1\n", ""
     for name, left, azimuth_deg in (("left", 0, 180), ("right", width, 0)):
         view = f'[[view]]\nname = "{name}"\narea_px = [{left}, 0, {width}, {height}]\n'
@@ -50,10 +48,10 @@ def write_touched_sensor(folder: Path) -> list[str]:
         scene += f"azimuth_deg = {azimuth_deg}\nback = true\n"
         centre_px = [left + 0.5 * width - 0.5, 0.5 * height - 0.5]
         rig += f"{view}focal_px = [{focal_px}, {focal_px}]\ncentre_px = {centre_px}\n"
-    (folder / "press.toml").write_text(scene + _MEDIUM + _CONTACT, encoding="utf-8")
+    (folder / "press.toml").write_text(f"{scene}{_MEDIUM}{sequence}{_CONTACT}", encoding="utf-8")
     (folder / "sensor.toml").write_text(f"{rig}{_MEDIUM}[elastomer]\n{_ELASTOMER}", encoding="utf-8")
     for words in (
-        "build tac3d -o pad --only layout",
+        f"build tac3d --set layers={layers} -o pad --only layout",
         "render pad/layout.json --scene press.toml -o frames",
         "calibrate gel pad/layout.json sensor.toml -o gel.npz",
     ):

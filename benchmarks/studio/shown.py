@@ -6,11 +6,15 @@ import json
 import tempfile
 from base64 import urlsafe_b64encode
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import av
 import cv2
 import numpy as np
+import psutil
 
 import cmpdesign
 from benchmarks.frame.table import TEXT
@@ -18,9 +22,12 @@ from benchmarks.studio.page import browser, served
 from benchmarks.studio.sensor import FPS, SIZE, write_touched_sensor
 
 FIELDS = {"pattern": "honeycomb", "layers": 10, "pitch_mm": 1.5}
-PICTURES, PITCH_PX, SETTLED_MS, FAST = 16, 20, 3000, 2
+PICTURES, PITCH_PX, SETTLED_MS, RATES = 16, 20, 3000, (FPS, 2 * FPS)
+# Full color in every row of pixels, as cameras send it, and in every second one, as most video files hold it.
+CAMERA_CHROMA, FILE_CHROMA = "yuvj422p", "yuvj420p"
 SHOWN = {
     "source": TEXT, "frames/s": ".0f", "read/s": ".1f", "shown/s": ".1f", "longest gap ms": ".0f",
+    "server ms": ".1f", "browser ms": ".1f",
 }  # fmt: skip
 # Every animation frame of the browser: its time, and the number of the frame that stands on the page.
 _COUNT = r"""() => {
@@ -35,6 +42,13 @@ _COUNT = r"""() => {
 _READ = "document.querySelector('dl.figures').innerText"
 
 
+class Spent(NamedTuple):
+    """Processor time so far of the server and of all processes of the browser, s."""
+
+    server_s: float
+    browser_s: float
+
+
 def shown_rows(seconds: float) -> Iterator[tuple[Any, ...]]:
     """The rows of ``SHOWN``."""
     with tempfile.TemporaryDirectory(prefix="cmpdesign-shown-") as name:
@@ -46,32 +60,31 @@ def shown_rows(seconds: float) -> Iterator[tuple[Any, ...]]:
             for k in range(PICTURES)
         ]
         there_and_back = images + images[::-1]
-        _write_camera(folder / "camera.y4m", there_and_back, FPS)
         state = urlsafe_b64encode(json.dumps({"fields": FIELDS}).encode()).decode().rstrip("=")
-        with served() as address, browser(folder / "camera.y4m") as chrome:
-            link = f"{address}#/touch?d={state}"
-            yield _row("camera of the browser", FPS, chrome, link, seconds, "Use the camera of this browser")
-        one_view = [str(folder / "layout.json")]
-        for fps in (FPS, FAST * FPS):
-            yield _view_row("view, one view", folder, one_view, there_and_back, fps, seconds)
+        for fps in RATES:
+            _write_camera(folder / "camera.y4m", there_and_back, fps)
+            with served() as address, browser(folder / "camera.y4m") as chrome:
+                link = f"{address}#/touch?d={state}"
+                yield _row(
+                    "camera of the browser", fps, chrome, link, seconds, "Use the camera of this browser"
+                )
         touched = folder / "touched"
         touched.mkdir()
         words = write_touched_sensor(touched)
         pressed = [cv2.imread(str(path)) for path in sorted((touched / "frames").glob("*.png"))]
-        yield _view_row("view, surface and force", folder, words, pressed + pressed[::-1], FPS, seconds)
-
-
-def _view_row(
-    name: str, folder: Path, words: Sequence[str], images: Sequence[Any], fps: int, seconds: float
-) -> tuple[Any, ...]:
-    """The row of ``view`` over a video."""
-    path = folder / "video.avi"
-    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), fps, SIZE)
-    for k in range(int(fps * (seconds + 20))):
-        video.write(images[k % len(images)])
-    video.release()
-    with served("view", words[0], str(path), *words[1:]) as address, browser() as chrome:
-        return _row(name, fps, chrome, f"{address}#/touch", seconds)
+        video = folder / "video.avi"
+        for name, arguments, frames in (
+            ("view, one view", [str(folder / "layout.json")], there_and_back),
+            ("view, surface and force", words, pressed + pressed[::-1]),
+        ):
+            for fps, chroma in (*((fps, CAMERA_CHROMA) for fps in RATES), (FPS, FILE_CHROMA)):
+                _write_video(video, frames, fps, seconds + 20, chroma)
+                row = f"{name}, {'4:2:0' if chroma == FILE_CHROMA else '4:2:2'}"
+                with (
+                    served("view", arguments[0], str(video), *arguments[1:]) as address,
+                    browser() as chrome,
+                ):
+                    yield _row(row, fps, chrome, f"{address}#/touch", seconds)
 
 
 def _row(name: str, fps: int, chrome: Any, address: str, seconds: float, button: str = "") -> tuple[Any, ...]:
@@ -81,13 +94,29 @@ def _row(name: str, fps: int, chrome: Any, address: str, seconds: float, button:
         page.click(f"text={button}")
     page.wait_for_timeout(SETTLED_MS)
     page.evaluate(_COUNT)
+    before = _spent()
     page.wait_for_timeout(1000 * seconds)
+    after = _spent()
     shown_ms = np.array([ms for _, ms in page.evaluate("window.seen")])
     words = page.evaluate(_READ).split("\n")
     read = float(words[words.index("Source") + 1].split()[0])
     page.close()
     gaps_ms = np.diff(shown_ms)
-    return name, fps, read, 1000 * len(gaps_ms) / float(gaps_ms.sum()), float(gaps_ms.max())
+    each_ms = [1000 * (end - start) / len(shown_ms) for start, end in zip(before, after, strict=True)]
+    return name, fps, read, 1000 * len(gaps_ms) / float(gaps_ms.sum()), float(gaps_ms.max()), *each_ms
+
+
+def _spent() -> Spent:
+    """The processor time of the running page and browser."""
+    server_s = browser_s = 0.0
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            words, times = process.cmdline(), process.cpu_times()
+            if "cmpdesign" in words:
+                server_s += times.user + times.system
+            elif words and "chrom" in words[0]:
+                browser_s += times.user + times.system
+    return Spent(server_s, browser_s)
 
 
 def _write_camera(path: Path, images: Sequence[Any], fps: int) -> None:
@@ -96,3 +125,20 @@ def _write_camera(path: Path, images: Sequence[Any], fps: int) -> None:
         file.write(f"YUV4MPEG2 W{SIZE[0]} H{SIZE[1]} F{fps}:1 Ip A1:1 C420jpeg\n".encode())
         for image in images:
             file.write(b"FRAME\n" + cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420).tobytes())
+
+
+def _write_video(path: Path, images: Sequence[Any], fps: int, seconds: float, chroma: str) -> None:
+    """A video of JPEG frames at the smallest loss; the images are repeated."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mjpeg", rate=Fraction(fps), options={"qmin": "2", "qmax": "2"})
+        stream.width, stream.height = SIZE
+        stream.pix_fmt = chroma
+        packets = [
+            bytes(packet)
+            for image in images
+            for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24"))
+        ]
+        for k in range(int(fps * seconds)):
+            packet = av.Packet(packets[k % len(packets)])
+            packet.stream, packet.pts, packet.dts, packet.time_base = stream, k, k, Fraction(1, fps)
+            container.mux(packet)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, TypedDict, Unpack
 from cmpdesign.inputs.options import Channels, Preset, Response, Side, Usual, Written, settled
 
 if TYPE_CHECKING:
-    from cmpdesign.data.folder import Progress
     from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from extractor import LayoutLike
@@ -62,9 +61,11 @@ def dataset(
     from cmpdesign.data.run import make_dataset, parse_shards
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.design.templates import find_plan
+    from cmpdesign.documents.data import DatasetDocument
 
     where = parse_scheduler(scheduler, workers)
-    return _document(output, make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from))
+    made = make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from)
+    return DatasetDocument.of(made, written=str(output))
 
 
 def extract(
@@ -98,11 +99,12 @@ def extract(
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.data.videos.extraction import FrameReading
+    from cmpdesign.documents.data import DatasetDocument
 
     texts = [str(text) for text in ([sources] if isinstance(sources, str | Path) else sources)]
     how, where = FrameReading(**settled(ReadingOptions, reading)), parse_scheduler(scheduler, workers)
     made = extract_markers(reference_from(layout), texts, output, how, where, frames_a_shard)
-    return _document(output, made)
+    return DatasetDocument.of(made, written=str(output))
 
 
 def check_dataset(folder: str | Path) -> DatasetCheckDocument:
@@ -110,25 +112,4 @@ def check_dataset(folder: str | Path) -> DatasetCheckDocument:
     from cmpdesign.data import check
     from cmpdesign.documents.data import DatasetCheckDocument
 
-    found = check(folder)
-    return DatasetCheckDocument(
-        folder=str(folder),
-        shards=found.shards,
-        of_shards=found.of_shards,
-        frames=found.frames,
-        bytes=found.bytes,
-        problems=list(found.problems),
-    )
-
-
-def _document(folder: str | Path, made: Progress) -> DatasetDocument:
-    from cmpdesign.documents.data import DatasetDocument
-
-    return DatasetDocument(
-        written=str(folder),
-        frames=made.frames,
-        shards=made.shards,
-        of_shards=made.of_shards,
-        redrawn=made.redrawn,
-        bytes=made.bytes,
-    )
+    return DatasetCheckDocument.of(check(folder), folder=str(folder))

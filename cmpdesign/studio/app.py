@@ -23,11 +23,9 @@ from cmpdesign.studio.guard import Door, Guard
 from cmpdesign.studio.live import (
     CameraReader,
     LiveFeed,
-    frame_document,
     hello_document,
     obey,
     open_camera,
-    shown_image,
 )
 from cmpdesign.studio.readings import MAX_PICTURE_BYTES, Readings
 from cmpdesign.studio.recording import KINDS, Recordings
@@ -154,8 +152,7 @@ class Studio:
                 await socket.send_json({"over": feed.failure or "the source has ended"})
                 return
             count = latest.count
-            await socket.send_json(frame_document(latest.frame, latest.frames_per_s))
-            await socket.send_bytes(await run_in_threadpool(shown_image, latest.image))
+            await socket.send_bytes(await run_in_threadpool(latest.message))
 
     async def _camera(self, socket: WebSocket) -> None:
         """Frames of the browser's camera, read with the layout of a design; one frame is under way."""
@@ -171,10 +168,10 @@ class Studio:
             try:
                 while (message := await socket.receive())["type"] != "websocket.disconnect":
                     if (data := message.get("bytes")) is not None:
-                        answer: Any = await run_in_threadpool(reader.read, data)
-                    else:
-                        words = message.get("text") or ""
-                        answer = await run_in_threadpool(obey, reader, words, self.recordings)
+                        await socket.send_bytes(await run_in_threadpool(reader.read, data))
+                        continue
+                    words = message.get("text") or ""
+                    answer = await run_in_threadpool(obey, reader, words, self.recordings)
                     if answer is not None:
                         await socket.send_json(answer)
             finally:

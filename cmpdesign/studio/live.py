@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 import time
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Condition, Thread
@@ -34,12 +36,19 @@ _RATE_FRAMES = 30  # over which the rate is counted
 
 @dataclass(frozen=True, eq=False)
 class Latest:
-    """The latest frame: its count, the tracked frame, its image, and the frames per second."""
+    """The latest frame: its count, the tracked frame, its image, the frames per second, and when it was read."""
 
     count: int
     frame: Any
     image: Any
     frames_per_s: float
+    read_s: float
+
+    def message(self) -> bytes:
+        """The message for the page, now; a surface is shown without its images."""
+        age_ms = self.frame.elapsed_ms + 1e3 * (time.monotonic() - self.read_s)
+        image = b"" if hasattr(self.frame, "shape") else shown_image(self.image)
+        return frame_message(self.frame, self.frames_per_s, age_ms, image)
 
 
 @dataclass(eq=False)
@@ -83,7 +92,7 @@ class LiveFeed:
         with self._changed:
             self._times.append(time.monotonic())
             count = 0 if self._latest is None else self._latest.count + 1
-            self._latest = Latest(count, frame, image, rate_of(self._times))
+            self._latest = Latest(count, frame, image, rate_of(self._times), self._times[-1])
             self._changed.notify_all()
 
     def newer(self, count: int) -> Latest | None:
@@ -180,8 +189,8 @@ class CameraReader:
         if self.recorder is not None:
             self.recorder.close()
 
-    def read(self, data: bytes) -> dict[str, Any]:
-        """The document of one frame; a frame that cannot be decoded has a reason.
+    def read(self, data: bytes) -> bytes:
+        """The message of one frame; a frame that cannot be decoded has a reason.
 
         Args:
             data: bytes of an image file.
@@ -195,7 +204,7 @@ class CameraReader:
         tracked = self._tracker.track(image, time_s=now_s, reason=problem)
         if self.recorder is not None:
             self.recorder.add(tracked)
-        return frame_document(tracked, rate_of(self._times))
+        return frame_message(tracked, rate_of(self._times))
 
 
 def open_camera(layout: Reference, number: int) -> LiveFeed:
@@ -244,8 +253,15 @@ def hello_document(layout: Reference, name: str) -> dict[str, Any]:
     }
 
 
-def frame_document(frame: Any, frames_per_s: float) -> dict[str, Any]:
-    """A tracked frame or a surface for the page: markers that are found, with their displacements."""
+def frame_message(frame: Any, frames_per_s: float, age_ms: float = 0.0, image: bytes = b"") -> bytes:
+    """A tracked frame or a surface for the page: markers that are found, with their displacements.
+
+    Args:
+        frame: a ``Tracked`` or a ``ShapeFrame``.
+        frames_per_s: rate of the reader.
+        age_ms: since the image was there.
+        image: a file that the page shows below the markers.
+    """
     in_space = hasattr(frame, "shape")
     status = frame.shape.status if in_space else frame.markers.status
     place = frame.shape.xyz_mm if in_space else frame.markers.xy_px
@@ -254,26 +270,44 @@ def frame_document(frame: Any, frames_per_s: float) -> dict[str, Any]:
     quality = None if in_space else frame.markers.quality
     largest_mm = np.linalg.norm(frame.shape.displacement_mm if in_space else frame.displacement_mm, axis=1)
     contact = frame.contact if in_space else None
-    return {
+    columns = {
+        "ids": found,
+        "status": status[found],
+        "place": place[found],
+        "moved": np.nan_to_num(moved[found]),
+    }
+    if contact is not None and np.isfinite(contact.force_n).all():
+        traction = np.nan_to_num(contact.marker_traction_mpa[found])
+        columns |= {"shear_mpa": traction[:, :2], "pressure_mpa": -traction[:, 2]}
+    told = {
         "index": frame.index,
         "tracked": frame.status == 1,
         "reason": frame.reason if not in_space or not frame.shape.problem else frame.shape.problem,
         "hints": [] if quality is None else list(quality.hints),
         "elapsed_ms": round(frame.elapsed_ms, 2),
+        "age_ms": round(age_ms, 2),
         "frames_per_s": round(frames_per_s, 2),
         "measured": int(np.count_nonzero(status == 1)),
         "in_space": in_space,
-        "ids": found.tolist(),
-        "status": status[found].tolist(),
-        "place": place[found].round(3).tolist(),
-        "moved": np.nan_to_num(moved[found]).round(4).tolist(),
         "largest_mm": round(float(np.nanmax(largest_mm)), 4) if np.isfinite(largest_mm).any() else None,
-        "contact": None if contact is None else contact_document(contact, found),
+        "contact": None if contact is None else contact_document(contact),
     }
+    return packed(told, columns, image)
 
 
-def contact_document(contact: ContactForce, found: NDArray[Any]) -> dict[str, Any]:
-    """Force and torque with their deviations, pressure and shear above the found markers, the regions' centres."""
+def packed(told: dict[str, Any], columns: Mapping[str, NDArray[Any]], rest: bytes = b"") -> bytes:
+    """A message: the length of its document as 4 bytes, the document, columns of 4-byte floats, and other bytes.
+
+    The document names the columns and the count of numbers of each; the first byte is the lowest everywhere.
+    """
+    text = json.dumps({**told, "columns": {name: column.size for name, column in columns.items()}}).encode()
+    text += b" " * (-len(text) % 4)  # floats start at a multiple of 4
+    numbers = [np.ascontiguousarray(column, "<f4").tobytes() for column in columns.values()]
+    return b"".join([len(text).to_bytes(4, "little"), text, *numbers, rest])
+
+
+def contact_document(contact: ContactForce) -> dict[str, Any]:
+    """Force and torque with their deviations, the largest pressure and shear, the regions' centres."""
     known = bool(np.isfinite(contact.force_n).all())
     values: dict[str, Any] = {"reason": contact.reason.text, "known": known}
     if known:
@@ -281,20 +315,20 @@ def contact_document(contact: ContactForce, found: NDArray[Any]) -> dict[str, An
         values |= {
             name: np.nan_to_num(np.sqrt(np.diag(cov))).round(4).tolist() for name, cov in sigma.items()
         }
+        traction = np.nan_to_num(contact.marker_traction_mpa)
         values |= {
             "force_n": contact.force_n.round(4).tolist(),
             "torque_nmm": contact.torque_nmm.round(3).tolist(),
+            "max_pressure_mpa": round(float(-traction[:, 2].min()), 5),
+            "max_shear_mpa": round(float(np.hypot(*traction[:, :2].T).max()), 5),
+            "utilisation": round(contact.utilisation, 3) if np.isfinite(contact.utilisation) else None,
+            "regions": [region.centre_mm.round(3).tolist() for region in contact.regions],
         }
-        values["shear_mpa"] = np.nan_to_num(contact.marker_traction_mpa[found, :2]).round(5).tolist()
-        values["pressure_mpa"] = np.nan_to_num(-contact.marker_traction_mpa[found, 2]).round(5).tolist()
-        values["utilisation"] = round(contact.utilisation, 3) if np.isfinite(contact.utilisation) else None
-        values["regions"] = [region.centre_mm.round(3).tolist() for region in contact.regions]
     return values
 
 
-def shown_image(image: Any) -> bytes:
-    """A frame's image as a JPEG; of several views the first; empty without an image."""
-    pixels = image[0] if isinstance(image, list) else image
+def shown_image(pixels: Any) -> bytes:
+    """A frame's image as a JPEG; empty without an image."""
     if pixels is None:
         return b""
     color = pixels if pixels.ndim == 3 else np.repeat(pixels[..., None], 3, axis=2)

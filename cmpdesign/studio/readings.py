@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmpdesign.api.pictures import Verifier
+from cmpdesign.api.verifying import Verifier
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import IMAGE_BITS, ImageFileError, read_image, to_jpeg

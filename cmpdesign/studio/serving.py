@@ -44,11 +44,12 @@ def serve(
         MissingLibraryError: the extra is not installed.
         CmpDesignError: the port cannot be opened.
     """
-    require_libraries("studio", "starlette", "uvicorn", "websockets")
+    require_libraries("studio", "starlette", "uvicorn", "websockets", "threadpoolctl")
     from cmpdesign.studio.app import make_app
 
     with extra("studio"):
         import uvicorn
+        from threadpoolctl import threadpool_limits
     listening = _listen(host, port)
     door = Door(host, listening.getsockname()[1], secrets.token_urlsafe(24))
     config = uvicorn.Config(
@@ -81,7 +82,9 @@ def serve(
                 for one, handler in earlier.items():
                     signal.signal(one, handler)
 
-    StudioServer(config).run(sockets=[listening])
+    # Further threads of linear algebra wait for their next sum by computing, on the cores that the browser needs.
+    with threadpool_limits(1, "blas"):
+        StudioServer(config).run(sockets=[listening])
 
 
 def _listen(host: str, port: int) -> socket.socket:

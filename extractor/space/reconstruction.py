@@ -21,7 +21,6 @@ from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
 from extractor.space.triangulation import (
     GATE_SIGMAS,
-    INFLATION_SIGMAS,
     PointReason,
     Points,
     deviating_moves,
@@ -310,8 +309,7 @@ class Reconstructor:
         """
         nearby = self.field.mean_around(points.misfit**2)
         wanted = np.where(nearby > NEIGHBOURHOOD_SIGMAS**2, nearby, 1.0)
-        applied = np.where(points.misfit > INFLATION_SIGMAS, points.misfit**2, 1.0)
-        factor = np.where(np.isfinite(wanted), np.maximum(wanted / applied, 1.0), 1.0)
+        factor = np.where(np.isfinite(wanted), np.maximum(wanted / points.inflation, 1.0), 1.0)
         return replace(points, cov_mm2=points.cov_mm2 * factor[:, None, None])
 
     def _estimate_model_px(self, rest: Sequence[Markers]) -> float:

@@ -12,8 +12,9 @@ from benchmarks.comparison import __main__ as comparison
 from benchmarks.datasets import __main__ as datasets
 from benchmarks.frame.published import Page, updated_pages
 from benchmarks.photoreal import __main__ as photoreal
+from benchmarks.studio import __main__ as studio
 
-EXPERIMENTS = (ablation, acceptance, accuracy, camera, comparison, datasets, extraction, photoreal)
+EXPERIMENTS = (ablation, acceptance, accuracy, camera, comparison, datasets, extraction, photoreal, studio)
 
 
 def published() -> list[Page]:

@@ -63,6 +63,14 @@ export function save(name, data, type = "text/plain") {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
+// A message: the length of its document, the document, its columns of numbers, and the bytes that follow.
+export function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true), told = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = 4 + length;
+  for (const [name, count] of Object.entries(told.columns)) { told[name] = new Float32Array(buffer, at, count); at += 4 * count; }
+  return { ...told, rest: new Uint8Array(buffer, at) };
+}
+
 // A dialog with a text that is pasted or opened; "take" may refuse it in words.
 export function openText(title, about, accept, value, take) {
   const text = h("textarea", { rows: 18, "aria-label": title, spellcheck: "false", ".value": value });

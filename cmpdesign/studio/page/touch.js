@@ -1,7 +1,7 @@
 // The part "Touch": a camera of this browser, or the source of "cmpdesign view", live: markers and arrows of one view,
 // the surface and forces of several. One frame is drawn while the next is on its way.
 
-import { ask, figures, h, number, toast } from "./base.js";
+import { ask, figures, h, number, toast, unpack } from "./base.js";
 import { design } from "./state.js";
 import { Surface } from "./surface.js";
 
@@ -10,6 +10,7 @@ const CAMERA_WORDS = { NotAllowedError: "The browser has no right to the camera:
 
 export class TouchPart {
   constructor(start) {
+    this.surface = new Surface(() => this.#draw());
     this.canvas = h("canvas", { role: "img", "aria-label": "The frame with its markers and displacements" });
     this.words = h("p", { class: "note" }, "No source yet.");
     this.video = h("video", { muted: true, playsinline: true, hidden: true });
@@ -53,14 +54,13 @@ export class TouchPart {
     socket.binaryType = "arraybuffer";
     socket.onmessage = ({ data }) => {
       if (socket !== this.socket) return;
-      if (typeof data !== "string") { onframe(data); return; }
+      if (typeof data !== "string") { onframe(unpack(data)); return; }
       const told = JSON.parse(data);
       if (told.over !== undefined) this.#stop(told.over);
       else if (told.note !== undefined) { toast(told.note); this.#setRecording(false); }
       else if (told.recording) this.#setRecording(true);
       else if (told.saved) { this.#setRecording(false); this.#download(told); }
-      else if (told.cells) { this.pad = told; this.words.textContent = told.name = fileOf(told.name); onframe(null); }
-      else onframe(told);
+      else { this.pad = told; this.words.textContent = told.name = fileOf(told.name); onframe(null); }
     };
     socket.onclose = ({ reason }) => { if (socket === this.socket) this.#stop(reason || "The connection has ended."); };
     this.socket = socket;
@@ -85,15 +85,12 @@ export class TouchPart {
   #openSource() { this.#follow("/live/source"); }
   #openMachine() { this.#follow(`/live/machine?${new URLSearchParams({ camera: this.cameras.value, fields: JSON.stringify(design.fields) })}`); }
 
-  // A frame is a document and then its image. When both have come, the next is asked for.
+  // When a frame is drawn, the next is asked for: the server sends the newest one.
   #follow(path) {
-    let frame = null;
-    this.#connect(path, async (data) => {
-      if (data !== null && !(data instanceof ArrayBuffer)) { frame = data; return; }
-      this.#send("next");
-      if (data === null) return;
-      const arrived = frame, image = data.byteLength ? await createImageBitmap(new Blob([data], { type: "image/jpeg" })) : null;
-      this.#show(arrived, image);
+    this.#connect(path, async (frame) => {
+      if (frame === null) { this.#send("next"); return; }
+      const takenMs = performance.now() - frame.age_ms;
+      this.#show(frame, frame.rest.length ? await createImageBitmap(new Blob([frame.rest], { type: "image/jpeg" })) : null, takenMs, () => this.#send("next"));
     });
   }
 
@@ -103,18 +100,18 @@ export class TouchPart {
     let stream;
     try { stream = await navigator.mediaDevices.getUserMedia({ video: { width: { ideal: 1280 } } }); } catch (error) { this.#stop(CAMERA_WORDS[error.name] ?? error.message); return; }
     const grab = new OffscreenCanvas(1, 1), take = async () => {
-      await new Promise((done) => this.video.requestVideoFrameCallback(done));
+      const takenMs = await new Promise((done) => this.video.requestVideoFrameCallback(done));
       grab.width = this.video.videoWidth;
       grab.height = this.video.videoHeight;
       grab.getContext("2d").drawImage(this.video, 0, 0);
       const [picture, blob] = await Promise.all([createImageBitmap(grab), grab.convertToBlob({ type: "image/jpeg", quality: 0.95 })]);
-      return [picture, await blob.arrayBuffer()];
+      return [picture, await blob.arrayBuffer(), takenMs];
     };
-    let sent = null, next = take();
-    this.#connect(`/live/camera?${new URLSearchParams({ fields: JSON.stringify(design.fields) })}`, async (told) => {
-      if (told) this.#show(told, sent);
-      const [picture, data] = await next;
-      sent = picture;
+    let sent = null, sentMs = 0, next = take();
+    this.#connect(`/live/camera?${new URLSearchParams({ fields: JSON.stringify(design.fields) })}`, async (frame) => {
+      if (frame) this.#show(frame, sent, sentMs);
+      const [picture, data, takenMs] = await next;
+      [sent, sentMs] = [picture, takenMs];
       this.#send(data);
       next = take();
     });
@@ -123,22 +120,23 @@ export class TouchPart {
     await this.video.play();
   }
 
-  // The latest frame is drawn once the browser draws; words follow a few times a second.
-  #show(frame, image) {
-    this.frame = frame;
-    this.image = image;
+  // The latest frame is drawn once the browser draws; words and plot follow a few times a second.
+  #show(frame, image, takenMs, ondraw = () => {}) {
+    Object.assign(this, { frame, image, takenMs });
     this.drawing ??= requestAnimationFrame((now) => {
       this.drawing = null;
+      if (!this.frame) return;
+      ondraw();
       this.#draw();
       this.#count(now);
-      if (!this.socket || now - (this.toldMs ?? 0) > TELL_MS) { this.toldMs = now; this.#tell(); }
+      if (!this.socket || now - (this.toldMs ?? 0) > TELL_MS) { this.toldMs = now; this.#tell(); this.#plotHistory(); }
     });
   }
 
   #stop(text) {
     const socket = this.socket;
     this.socket = null;
-    if (this.frame) this.#tell();
+    if (this.frame) { this.#tell(); this.#plotHistory(); }
     socket?.close();
     for (const track of this.stream?.getTracks() ?? []) track.stop();
     this.stream = null;
@@ -148,81 +146,85 @@ export class TouchPart {
   }
 
   #draw() {
-    const frame = this.frame, { clientWidth: width, clientHeight: height } = this.space;
-    if (!frame || !width || !height) return;
-    if (frame.in_space) {
-      this.surface ??= new Surface();
-      if (this.surface.canvas.parentElement !== this.space) this.space.replaceChildren(this.surface.canvas);
-      this.surface.show(this.pad, frame, Number(this.factor.value), width, height);
-      return;
-    }
-    if (this.canvas.parentElement !== this.space) this.space.replaceChildren(this.canvas);
-    const ratio = devicePixelRatio, context = this.canvas.getContext("2d"), image = this.image;
-    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) Object.assign(this.canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
-    const size = image ? [image.width, image.height] : [640, 480], scale = Math.min(width / size[0], height / size[1]) * ratio;
-    context.setTransform(1, 0, 0, 1, 0, 0);
-    context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    context.setTransform(scale, 0, 0, scale, (this.canvas.width - scale * size[0]) / 2, (this.canvas.height - scale * size[1]) / 2);
+    const { frame, image } = this, factor = Number(this.factor.value), canvas = frame?.in_space ? this.surface.canvas : this.canvas;
+    if (!frame || !this.space.clientWidth || !this.space.clientHeight) return;
+    if (canvas.parentElement !== this.space) this.space.replaceChildren(canvas);
+    const { context, width, height } = cleared(canvas, this.space);
+    if (frame.in_space) { this.surface.draw(context, this.pad, frame, factor, width, height); return; }
+    const size = image ? [image.width, image.height] : [640, 480], scale = Math.min(width / size[0], height / size[1]);
+    context.translate((width - scale * size[0]) / 2, (height - scale * size[1]) / 2);
+    context.scale(scale, scale);
     if (image) context.drawImage(image, 0, 0);
     context.translate(0.5, 0.5); // the centre of the top-left pixel is (0, 0)
-    const factor = Number(this.factor.value), radius = (2.2 * ratio) / scale;
-    context.lineWidth = (1.6 * ratio) / scale;
+    const { place, moved, status } = frame, radius = 2.2 / scale;
+    context.lineWidth = 1.6 / scale;
     context.strokeStyle = "#54f0ff";
     context.beginPath();
-    frame.place.forEach(([x, y], at) => { const [dx, dy] = frame.moved[at]; context.moveTo(x, y); context.lineTo(x + factor * dx, y + factor * dy); });
+    for (let k = 0; k < place.length; k += 2) { context.moveTo(place[k], place[k + 1]); context.lineTo(place[k] + factor * moved[k], place[k + 1] + factor * moved[k + 1]); }
     context.stroke();
-    frame.place.forEach(([x, y], at) => { context.fillStyle = STATUS_COLORS[frame.status[at]]; context.fillRect(x - radius, y - radius, 2 * radius, 2 * radius); });
+    for (let k = 0; k < place.length; k += 2) { context.fillStyle = STATUS_COLORS[status[k / 2]]; context.fillRect(place[k] - radius, place[k + 1] - radius, 2 * radius, 2 * radius); }
   }
 
   #count(now) {
     const { frame } = this, force = forceOf(frame);
     this.shownTimes = [...this.shownTimes.slice(1 - RATE_FRAMES), now];
+    this.ageMs = performance.now() - this.takenMs;
     this.hasForce ||= Boolean(force);
     this.history.push(force ? { values: [...force.force_n, ...force.torque_nmm], sigmas: [...force.force_sigma_n, ...force.torque_sigma_nmm] } : { values: this.hasForce ? [] : [frame.largest_mm ?? NaN], sigmas: [] });
     this.history.splice(0, this.history.length - PLOT_FRAMES);
     if (this.socket) this.words.textContent = frame.tracked ? `${this.pad.name} · frame ${frame.index}` : "The pattern is not found.";
-    this.#plotHistory();
   }
 
   #tell() {
     const { frame, shownTimes: times } = this, force = forceOf(frame), shown = times.length > 1 ? (1000 * (times.length - 1)) / (times.at(-1) - times[0]) : 0;
     const withSigma = (name, values, sigmas, unit) => values.map((value, at) => [`${name} ${"xyz"[at]}`, `${value.toFixed(3)} ± ${sigmas[at].toFixed(3)} ${unit}`]);
-    const rows = [["Markers measured", `${frame.measured} of ${this.pad.markers}`], ["Reader", `${frame.elapsed_ms.toFixed(1)} ms`], ["Source", `${frame.frames_per_s.toFixed(1)} frames/s`], ["Shown", `${shown.toFixed(1)} frames/s`], ["Frame", frame.index],
+    const rows = [["Markers measured", `${frame.measured} of ${this.pad.markers}`], ["Reader", `${frame.elapsed_ms.toFixed(1)} ms`], ["Source", `${frame.frames_per_s.toFixed(1)} frames/s`], ["Shown", `${shown.toFixed(1)} frames/s`], ["Age when shown", `${this.ageMs.toFixed(0)} ms`], ["Frame", frame.index],
       ["Largest displacement", frame.largest_mm === null ? "–" : `${number(frame.largest_mm, 3)} mm`]];
-    if (force) rows.push(...withSigma("Force", force.force_n, force.force_sigma_n, "N"), ...withSigma("Torque", force.torque_nmm, force.torque_sigma_nmm, "N mm"), ["Pressure to", `${number(1e3 * Math.max(...force.pressure_mpa), 3)} kPa`], ["Shear to", `${number(1e3 * Math.max(...force.shear_mpa.map((by) => Math.hypot(...by))), 3)} kPa`], ["Contacts", force.regions.length], ...(force.utilisation === null ? [] : [["Of the friction", force.utilisation < 1 ? `${number(100 * force.utilisation, 2)} %` : "slips"]]));
+    if (force) rows.push(...withSigma("Force", force.force_n, force.force_sigma_n, "N"), ...withSigma("Torque", force.torque_nmm, force.torque_sigma_nmm, "N mm"), ["Pressure to", `${number(1e3 * force.max_pressure_mpa, 3)} kPa`], ["Shear to", `${number(1e3 * force.max_shear_mpa, 3)} kPa`], ["Contacts", force.regions.length], ...(force.utilisation === null ? [] : [["Of the friction", force.utilisation < 1 ? `${number(100 * force.utilisation, 2)} %` : "slips"]]));
     const notes = [...new Set([frame.reason, frame.contact?.reason, ...frame.hints].filter(Boolean))].map((text) => h("div", { class: `finding ${frame.tracked ? "warning" : "error"}` }, text));
     this.health.replaceChildren(h("h2", {}, "Health"), figures(rows), ...notes);
   }
 
   // Force and torque over the last frames with their deviations, or the largest displacement.
   #plotHistory() {
-    const { clientWidth: width, clientHeight: height } = this.plot, ratio = devicePixelRatio, context = this.plot.getContext("2d");
-    if (!width) return;
-    Object.assign(this.plot, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
-    context.scale(ratio, ratio);
-    const panels = this.hasForce ? [["Force, N", 0, 3], ["Torque, N mm", 3, 6]] : [["Largest displacement, mm", 0, 1]];
+    if (!this.plot.clientWidth) return;
+    const { context, width, height } = cleared(this.plot, this.plot), panels = this.hasForce ? [["Force, N", 0, 3], ["Torque, N mm", 3, 6]] : [["Largest displacement, mm", 0, 1]];
     this.plotWords.replaceChildren(...panels.map(([title, first, end], at) => {
       const [low, high] = this.#plotPanel(context, first, end, (at * height) / panels.length, width, height / panels.length);
       return h("span", {}, `${title}: ${number(low, 3)} to ${number(high, 3)}`);
     }), this.hasForce ? h("span", {}, "red x, green y, blue z; bands: deviations") : "");
   }
 
-  // The values of a panel between their lowest and highest.
+  // The values of a panel between their lowest and highest, each with a band of one deviation to both sides.
   #plotPanel(context, first, end, top, width, height) {
-    const axes = [...Array(end - first).keys()], column = (axis) => this.history.map(({ values, sigmas }) => [values[first + axis] ?? NaN, sigmas[first + axis] ?? 0]);
-    const columns = axes.map(column), known = columns.flat().map(([value]) => value).filter(Number.isFinite), low = Math.min(0, ...known), high = Math.max(1e-6, ...known);
+    const axes = [...Array(end - first).keys()], known = this.history.flatMap(({ values }) => values.slice(first, end)).filter(Number.isFinite), low = Math.min(0, ...known), high = Math.max(1e-6, ...known);
     const x = (at) => (at / Math.max(RATE_FRAMES, this.history.length)) * width, y = (value) => top + height - 5 - ((value - low) / (high - low)) * (height - 10);
-    columns.forEach((points, axis) => {
+    for (const axis of axes) {
+      const points = this.history.map(({ values, sigmas }, at) => ({ at, value: values[first + axis], sigma: sigmas[first + axis] })).filter(({ value }) => Number.isFinite(value));
+      const line = (side) => points.map(({ at, value, sigma }) => [x(at), y(value + side * (sigma || 0))]);
       context.strokeStyle = context.fillStyle = AXIS_COLORS[axis];
       context.globalAlpha = 0.25;
-      points.forEach(([value, sigma], at) => { if (sigma > 0) context.fillRect(x(at), y(value + sigma), x(1), y(value - sigma) - y(value + sigma)); });
+      context.fill(pathOf([...line(1), ...line(-1).reverse()]));
       context.globalAlpha = 1;
-      context.beginPath();
-      points.forEach(([value], at) => context.lineTo(x(at), y(value)));
-      context.stroke();
-    });
+      context.stroke(pathOf(line(0)));
+    }
     return [low, high];
   }
+}
+
+// An empty canvas as large as a box of the page; its units are those of the page.
+function cleared(canvas, { clientWidth: width, clientHeight: height }) {
+  const ratio = devicePixelRatio, [across, down] = [Math.round(width * ratio), Math.round(height * ratio)], context = canvas.getContext("2d");
+  if (canvas.width !== across || canvas.height !== down) Object.assign(canvas, { width: across, height: down });
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return { context, width, height };
+}
+
+function pathOf(points) {
+  const path = new Path2D();
+  for (const point of points) path.lineTo(...point);
+  return path;
 }
 
 const fileOf = (name) => name.split(/[\\/]/).at(-1);

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,9 @@ from axe_playwright_python.sync_playwright import Axe
 
 import cmpdesign
 from benchmarks.studio.page import browser, chromium, options, served
+from benchmarks.studio.sensor import write_touched_sensor
 from cmpdesign.products.drawing.svg import layout_to_svg
+from tests.support.tracking.live_messages import unpacked
 
 pytestmark = [
     pytest.mark.slow,
@@ -212,19 +216,19 @@ def test_200_frames_of_a_camera_against_the_truth(chrome: Any, address: str, tmp
         page = with_camera.new_page()
         page.on(
             "websocket",
-            lambda socket: socket.on("framereceived", lambda text: frames.append(json.loads(text))),
+            lambda socket: socket.on("framereceived", partial(keep_frame, frames)),
         )
         page.goto(address)
         open_template(page, "tac3d")
         page.click("nav >> text=Touch")
         page.click("text=Use the camera of this browser")
-        while len(frames) < 201:
+        while len(frames) < 200:
             page.wait_for_timeout(200)
         assert re.search(r"frame \d+", page.inner_text(".note"))
     errors = []
-    for frame in frames[1:201]:  # the first is the pad
+    for frame in frames[:200]:
         assert frame["tracked"] and frame["measured"] > 320, frame["reason"]
-        distance = np.linalg.norm(np.array(frame["place"]) - truth[:, frame["ids"]], axis=2)
+        distance = np.linalg.norm(frame["place"] - truth[:, frame["ids"]], axis=2)
         errors.append(distance[distance.mean(axis=1).argmin()])
     assert np.concatenate(errors).max() < 2.0  # no marker under another's id; a JPEG of a JPEG
     assert np.sqrt(np.mean(np.concatenate(errors) ** 2)) < 0.3
@@ -252,6 +256,46 @@ def test_a_camera_without_a_right_and_a_source_of_view(chrome: Any, address: str
         page.close()
     assert len(cmpdesign.load_run(tmp_path / "run.npz").arrays["displacement_mm"]) == 8
     assert (tmp_path / "run.npz.summary.json").exists()
+
+
+def test_a_surface_under_a_ball_is_shown_and_turned(chrome: Any, tmp_path: Path) -> None:
+    """The pressed cells are red, a key turns the surface, and the force is that of the frame in words."""
+    words = write_touched_sensor(tmp_path, frames=4, layers=5)
+    frames: list[dict[str, Any]] = []
+    with served("view", words[0], f"{tmp_path}/frames", *words[1:]) as live:
+        page = chrome.new_page()
+        page.on("websocket", lambda socket: socket.on("framereceived", partial(keep_frame, frames)))
+        page.goto(f"{live}#/touch")
+        page.wait_for_selector(".note:has-text('the source has ended')")
+        surface = page.locator("canvas[aria-label^='The surface']")
+        shown = [pixels_of(surface)]
+        for key in ("ArrowRight", "-"):
+            surface.press(key)
+            shown.append(pixels_of(surface))
+        told = page.inner_text("aside")
+        page.close()
+    last = frames[-1]
+    assert last["in_space"] and last["rest"] == b"" and last["place"].shape == (len(last["ids"]), 3)
+    assert last["contact"]["force_n"][2] < -0.05 and f"{last['contact']['force_n'][2]:.3f} ±" in told
+    assert re.search(r"Age when shown\s+\d+ ms", told)
+    strongest = last["place"][last["pressure_mpa"].argmax()]
+    assert np.hypot(*strongest[:2]) < 2.0  # the ball presses at the centre
+    drawn = [pixels[..., 3] > 0 for pixels in shown]
+    assert drawn[0].mean() > 0.1 and drawn[2].sum() < 0.8 * drawn[1].sum()
+    assert (shown[1] != shown[0]).any(axis=2).mean() > 0.05
+
+
+def pixels_of(canvas: Any) -> Any:
+    """(H, W, 4) of a canvas."""
+    url = canvas.evaluate("one => one.toDataURL()")
+    return cv2.imdecode(
+        np.frombuffer(base64.b64decode(url.partition(",")[2]), np.uint8), cv2.IMREAD_UNCHANGED
+    )
+
+
+def keep_frame(frames: list[dict[str, Any]], data: Any) -> None:
+    if isinstance(data, bytes):
+        frames.append(unpacked(data))
 
 
 def assert_is_in_order(page: Any, width: int, part: str) -> None:

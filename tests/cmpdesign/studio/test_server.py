@@ -34,6 +34,7 @@ from cmpdesign.studio.guard import Door
 from cmpdesign.studio.live import LiveFeed
 from cmpdesign.studio.serving import serve
 from tests.support.laser_tools import coupon_photo
+from tests.support.tracking.live_messages import unpacked
 
 DOOR = Door("127.0.0.1", 8300, "the-token-of-this-run")
 HOME, SOCKETS = "http://127.0.0.1:8300", "ws://127.0.0.1:8300"
@@ -202,7 +203,7 @@ def test_builds_are_few_and_private_and_leave_nothing() -> None:
 def test_a_picture_is_read_as_the_call_reads_it(page: TestClient) -> None:
     design = cmpdesign.Design(**FIELDS)
     image = cmpdesign.render(design.layout, pitch_px=30, rotation_deg=20, noise=1).image
-    expected = cmpdesign.verify(design.layout, image)
+    expected = cmpdesign.verify(design.layout, image).found
     query = {"fields": '{"pattern": "honeycomb", "layers": 3, "pitch_mm": "60mil"}', "name": "seen.png"}
     found = page.post("/api/readings", params=query, content=to_png(image)).json()
     assert found["verified"] and found["measured"] == expected.measured == len(found["ids"])
@@ -234,16 +235,16 @@ def test_frames_of_the_browsers_camera_are_tracked(page: TestClient) -> None:
         assert socket.receive_json()["markers"] == 37
         for number, frame in enumerate(frames):
             socket.send_bytes(to_png(frame.image))
-            found = socket.receive_json()
+            found = unpacked(socket.receive_bytes())
             assert found["measured"] == 37 and found["tracked"]
             assert np.abs(found["place"] - frame.truth.marker_xy_px[found["ids"]]).max() < 0.3
             assert np.abs(found["moved"] - number * moved[found["ids"]]).max() < 0.3
         socket.send_text("rest")
         socket.send_bytes(to_png(frames[1].image))
-        assert np.abs(socket.receive_json()["moved"]).max() < 0.3
+        assert np.abs(unpacked(socket.receive_bytes())["moved"]).max() < 0.3
         socket.send_bytes(b"no picture")
-        lost = socket.receive_json()
-        assert not lost["tracked"] and "is not an image" in lost["reason"] and lost["ids"] == []
+        lost = unpacked(socket.receive_bytes())
+        assert not lost["tracked"] and "is not an image" in lost["reason"] and len(lost["ids"]) == 0
 
 
 @pytest.mark.parametrize("headers", [{}, {"origin": "http://rebound.example"}, {"origin": "null"}])
@@ -270,8 +271,8 @@ def test_a_run_is_shown_and_recorded(tmp_path: Path) -> None:
         with client.websocket_connect(f"{SOCKETS}/live/source", headers={"origin": HOME}) as socket:
             assert socket.receive_json()["name"] == "frames"
             socket.send_text("next")
-            assert (shown := socket.receive_json())["index"] == 3 and shown["measured"] == 37
-            assert socket.receive_bytes().startswith(b"\xff\xd8")
+            shown = unpacked(socket.receive_bytes())
+            assert shown["index"] == 3 and shown["measured"] == 37 and shown["rest"].startswith(b"\xff\xd8")
             socket.send_text("next")
             assert socket.receive_json() == {"over": "the source has ended"}
 
@@ -373,8 +374,8 @@ def test_a_camera_of_this_machine_is_shown_and_recorded(
         assert socket.receive_json() == {"recording": True}
         for _ in range(5):
             socket.send_text("next")
-            assert socket.receive_json()["measured"] == 37
-            assert socket.receive_bytes().startswith(b"\xff\xd8")
+            shown = unpacked(socket.receive_bytes())
+            assert shown["measured"] == 37 and shown["rest"].startswith(b"\xff\xd8")
         socket.send_text("save")
         saved = socket.receive_json()
     data = page.get(f"/api/recordings/{saved['saved']}").content
