@@ -21,12 +21,12 @@ void fill_unseen(View<double, 3> levels, View<const std::uint8_t, 1> ink, std::u
     for (Index channel = 0; channel < 3; ++channel) {
       double sum = 0.0, count = 0.0;
       for (Index i = 0; i < ink.size(); ++i) {
-        if (ink[i] != own || std::isnan(levels(0, i, 0))) continue;
-        sum += levels(kind, i, channel), count += 1.0;
+        const double level = levels(kind, i, channel);
+        if (ink[i] == own && !std::isnan(level)) sum += level, count += 1.0;
       }
-      const double mean = count > 0.0 ? sum / count : 0.0;
       for (Index i = 0; i < ink.size(); ++i) {
-        if (ink[i] == own && std::isnan(levels(kind, i, channel))) levels(kind, i, channel) = mean;
+        double& level = levels(kind, i, channel);
+        if (ink[i] == own && std::isnan(level)) level = count > 0.0 ? sum / count : 0.0;
       }
     }
   }
