@@ -10,7 +10,7 @@ Every command has its call:
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
     cmpdesign.open_sensor("thumb.toml", "index.toml")     sensors of a robot: the newest result, and what was dropped
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
-    cmpdesign.kerf, laser_grid, calibrate_camera, calibrate_pattern, evaluate, export_lerobot, export_zarr
+    cmpdesign.kerf, calibrate_camera, calibrate_pattern, evaluate, export_lerobot, export_zarr
 
 The rooms of the package, each of which imports only rooms above it, left column first:
 
@@ -69,7 +69,6 @@ if TYPE_CHECKING:
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
     from cmpdesign.api.workshop import kerf as kerf
-    from cmpdesign.api.workshop import laser_grid as laser_grid
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
     from cmpdesign.errors import InputError as InputError
@@ -131,7 +130,6 @@ _HOMES = {
     "extract": "cmpdesign.api.datasets",
     "init": "cmpdesign.api.making",
     "kerf": "cmpdesign.api.workshop",
-    "laser_grid": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
     "load": "cmpdesign.api.designs",
     "load_run": "cmpdesign.api.sequences",

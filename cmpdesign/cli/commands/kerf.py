@@ -18,26 +18,18 @@ if TYPE_CHECKING:
 EXAMPLES = ("cmpdesign kerf coupon.json scan.png", "cmpdesign kerf grid.json photo.jpg --json")
 
 
-@derived(workshop.kerf, coupon="the coupon.json or grid.json that build wrote")
+@derived(workshop.kerf)
 def kerf(coupon: Path, photo: Path, **options: Any) -> None:
     """A grid of settings is read, too. The lines for the material's file are printed."""
     from cmpdesign.products.laser.coupon.design import load_coupon
 
-    cut_coupon = load_coupon(coupon)
+    cut_coupon, done = load_coupon(coupon), workshop.kerf(coupon, photo, **options)
     if cut_coupon.kind == "grid":
-        del options["face"]
-        grid = workshop.laser_grid(coupon, photo, **options)
-        _print_grid(cut_coupon, grid.found, photo)
-        finish(lambda: grid)
-        return
-    found = workshop.kerf(coupon, photo, **options)
-    print_step(f"{printable_path(photo)} is read")
-    reading = found.found
-    _print_kerf_table(cut_coupon, reading)
-    say(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
-    for patch_kerf in reading.patches:
-        say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
-    finish(lambda: found)
+        _print_grid(cut_coupon, done.found, photo)
+    else:
+        print_step(f"{printable_path(photo)} is read")
+        _print_kerfs(cut_coupon, done.found, photo)
+    finish(lambda: done)
 
 
 def _print_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
@@ -86,7 +78,8 @@ def _settings_lines(one: FieldReading, photo: str) -> str:
     return "\n".join(f"{name} = {{ value = {value}, source = {source} }}" for name, value in values.items())
 
 
-def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
+def _print_kerfs(coupon: Coupon, reading: CouponReading, photo: Path) -> None:
+    """Print a coupon's table, and the lines for the material's file."""
     side = "back" if reading.from_back else "front"
     say(
         f"seen from the {side}, {reading.scale_px_mm:.1f} px in a mm, marks fit to {1000 * reading.fit_mm:.1f} um, "
@@ -108,6 +101,9 @@ def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
     numbers = ("power", "speed", "times over", "+-", "front x", "front y", "back x", "back y")
     say_columns(("patch", *(f">{name}" for name in numbers)), rows)
     say("kerfs in mm; x of cuts along y, y of cuts along x")
+    say(f"\nfor the file of {coupon.material}, the settings of {coupon.machine}:")
+    for patch_kerf in reading.patches:
+        say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
 
 
 def _material_file_lines(reading: CouponReading, patch_kerf: PatchKerf, photo: str) -> str:
