@@ -10,7 +10,7 @@ Every command has its call:
     cmpdesign.track("layout.json", "a.mp4", "run.npz"), reconstruct, load_run, plot_history
     cmpdesign.open_sensor("thumb.toml", "index.toml")     sensors of a robot: the newest result, and what was dropped
     cmpdesign.dataset("plan.toml", "pressed"), extract, cmpdesign.data.load("pressed")
-    cmpdesign.kerf, laser_grid, calibrate_camera, calibrate_pattern, evaluate, export_lerobot, export_zarr
+    cmpdesign.kerf, calibrate_camera, calibrate_pattern, evaluate, export_lerobot, export_zarr
 
 The rooms of the package, each of which imports only rooms above it, left column first:
 
@@ -51,11 +51,8 @@ if TYPE_CHECKING:
     from cmpdesign.api.making import init as init
     from cmpdesign.api.making import schema as schema
     from cmpdesign.api.making import templates as templates
-    from cmpdesign.api.pictures import Verifier as Verifier
     from cmpdesign.api.pictures import load_scene as load_scene
     from cmpdesign.api.pictures import render as render
-    from cmpdesign.api.pictures import render_sequence as render_sequence
-    from cmpdesign.api.pictures import verify as verify
     from cmpdesign.api.plots import plot_displacement as plot_displacement
     from cmpdesign.api.plots import plot_history as plot_history
     from cmpdesign.api.plots import plot_layout as plot_layout
@@ -66,11 +63,12 @@ if TYPE_CHECKING:
     from cmpdesign.api.sequences import reconstruct as reconstruct
     from cmpdesign.api.sequences import recover_run as recover_run
     from cmpdesign.api.sequences import track as track
+    from cmpdesign.api.verifying import Verifier as Verifier
+    from cmpdesign.api.verifying import verify as verify
     from cmpdesign.api.workshop import evaluate as evaluate
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
     from cmpdesign.api.workshop import kerf as kerf
-    from cmpdesign.api.workshop import laser_grid as laser_grid
     from cmpdesign.errors import CmpDesignError as CmpDesignError
     from cmpdesign.errors import DesignError as DesignError
     from cmpdesign.errors import InputError as InputError
@@ -113,7 +111,7 @@ _HOMES = {
     "ShapeOptions": "cmpdesign.tracking.jobs.options",
     "TouchedError": "cmpdesign.runtime.zero",
     "TrackOptions": "cmpdesign.tracking.jobs.options",
-    "Verifier": "cmpdesign.api.pictures",
+    "Verifier": "cmpdesign.api.verifying",
     "build": "cmpdesign.api.making",
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
@@ -132,7 +130,6 @@ _HOMES = {
     "extract": "cmpdesign.api.datasets",
     "init": "cmpdesign.api.making",
     "kerf": "cmpdesign.api.workshop",
-    "laser_grid": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
     "load": "cmpdesign.api.designs",
     "load_run": "cmpdesign.api.sequences",
@@ -147,12 +144,11 @@ _HOMES = {
     "reconstruct": "cmpdesign.api.sequences",
     "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
-    "render_sequence": "cmpdesign.api.pictures",
     "schema": "cmpdesign.api.making",
     "size": "cmpdesign.proposal.camera_design",
     "templates": "cmpdesign.api.making",
     "track": "cmpdesign.api.sequences",
-    "verify": "cmpdesign.api.pictures",
+    "verify": "cmpdesign.api.verifying",
     "write_layout": "cmpdesign.files.layout_json",
     "write_svg": "cmpdesign.products.drawing.svg",
 }

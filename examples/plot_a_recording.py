@@ -31,7 +31,7 @@ def main(layout: str = "", source: str = "") -> None:
         if not source:
             cmpdesign.load("honeycomb", layers=6).layout.write(layout := f"{made}/layout.json")
             (made / "press.toml").write_text(PRESS, encoding="utf-8")
-            cmpdesign.render_sequence(layout, made / "press.toml", source := f"{made}/frames")
+            cmpdesign.render(layout, made / "press.toml", source := f"{made}/frames")
         cmpdesign.track(layout, source, made / "run.npz", rest=0, fps=10)
         run = cmpdesign.load_run(made / "run.npz")
         cmpdesign.plot_history(run).figure.savefig(made / "history.png")

@@ -1,7 +1,7 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
 Stages: image, seeds, grow, mesh, light, walk, number, triangles, place, refine, repair, virtual, quality. A warm
-start of the tracker goes from image over predict and prove to refine.
+start of the tracker goes from image over prove to refine.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
 from extractor.refine.relief import points_without_parallax, without_parallax
-from extractor.result import Markers, Origin, Reason, VirtualMarkers
+from extractor.result import VIRTUAL, Markers, Origin, Reason, VirtualMarkers
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
@@ -297,7 +297,7 @@ class ImageReader:
         stages.record("repair", repaired)
 
         def virtual() -> VirtualMarkers:
-            points = refined.points
+            points = refined.points[:, : layout.virtual_per_edge]
             if parallax is not None:
                 points = points_without_parallax(parallax, topology.edges, apparent.xy_px, points)
             return locate_virtual_markers(topology, repaired, points, refined.scatter)
@@ -307,7 +307,7 @@ class ImageReader:
         quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)
         quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
         markers = Markers.with_later(
-            virtual,
+            {VIRTUAL: virtual},
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,
             status=repaired.status,

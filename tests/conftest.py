@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -15,18 +14,13 @@ from typer.main import get_command
 
 from tests.support.layouts import small_text
 
+# Typer makes all commands anew for every call, which takes longer than most calls.
+pytest.MonkeyPatch().setattr("typer.testing._get_command", cache(get_command))
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest test starts first, so that no worker waits for it at the end."""
     items.sort(key=lambda item: item.get_closest_marker("longest") is None)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def commands_made_once() -> Iterator[None]:
-    """Typer makes all commands anew for every call, which takes longer than most calls."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("typer.testing._get_command", cache(get_command))
-        yield
 
 
 @pytest.fixture

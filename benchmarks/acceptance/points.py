@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from scipy import stats
+from scipy.special import betaincinv
 
 from benchmarks.suites.ablation.trial import PictureScore
 
@@ -17,7 +17,7 @@ MAX_LOST = 1.05  # times as many as at the reader's own threshold
 
 def upper_share(wrong: int, count: int) -> float:
     """The one-sided upper bound of a share (Clopper and Pearson, Biometrika 26, 404, 1934); 3 / count of none."""
-    return float(stats.beta.ppf(CONFIDENCE, wrong + 1, count - wrong)) if wrong < count else 1.0
+    return float(betaincinv(wrong + 1, count - wrong, CONFIDENCE)) if wrong < count else 1.0
 
 
 class Point(NamedTuple):

@@ -76,8 +76,9 @@ def measure(quick: bool = False) -> Shown:
 
 def page(results: dict[str, Any]) -> Page:
     """The table of docs/how-to/studio.md."""
-    rows = [tuple(row.values()) for row in results["shown"]]
-    return Page({"studio": Table("frames on the page", SHOWN, rows).markdown()})
+    rows = [tuple(row[name] for name in SHOWN) for row in results["shown"]]
+    machine = f"Machine: {results['conditions']['cpu']}, of which other programs have their share, too."
+    return Page({"studio": f"{Table('', SHOWN, rows).markdown()}\n\n{machine}"})
 
 
 main = Experiment("studio", measure, page)

@@ -111,10 +111,8 @@ def _camera_figures(found: CameraCalibration, unread: Mapping[str, str]) -> dict
         "model": found.model.name,
         "parameters": dict(zip(names, values, strict=True)),
         "deviations": dict(zip(names, map(float, found.cov.diagonal() ** 0.5), strict=True)),
-        "held": found.held,
         "rms_px": found.rms_px,
         "scale": found.adjusted.base,
-        "ray_px": found.ray_px,
         "sheet_bend_mm": found.bend_mm,
         "further_view": found.advice.text,
         "further_view_ray_px": found.advice.ray_px,
@@ -261,7 +259,7 @@ def calibrate_rig(
         from cmpdesign.files.atomic import write_file
 
         dated = [name for whole in names[: len(given)] for name in whole.split(",")]
-        text = calibrated_text(sensor, calibration, len(given), tuple(ways), _date_of(dated))
+        text = calibrated_text(sensor, calibration, reference, len(given), tuple(ways), _date_of(dated))
         write_file(Path(output), text)
     return _rig_document(calibration, str(output or ""), len(given), tuple(ways))
 
@@ -287,14 +285,9 @@ def _rig_document(
         written=written,
         pictures=pictures,
         steps_mm=steps_mm,
-        plate_markers=found.plate_markers,
         parameters=dict(zip(names, found.values.tolist(), strict=True)),
         stated=dict(zip(names, found.stated.tolist(), strict=True)),
         deviations=dict(zip(found.names, found.deviations.tolist(), strict=True)),
-        held=found.held,
-        rms_px=found.rms_px,
-        scale=found.scale,
-        depth_share=found.depth_share,
         mirrors=mirrors,
     )
 
@@ -332,6 +325,7 @@ def calibrate_check(
             "calibrate rig"
         )
     reference = reference_from(file.layout if layout is None else layout)
+    file.require_layout(reference)
     names = [str(images)] if isinstance(images, str | Path) else [str(one) for one in images]
     found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
     before = file.table.calibration.rig
@@ -361,14 +355,8 @@ def _check_document(found: SensorCheck, names: Sequence[str]) -> CalibrateCheckD
     ]
     return CalibrateCheckDocument.of(
         found,
-        holds=found.holds,
-        misfit=found.misfit,
         picture_misfits=dict(zip(names, found.picture_misfits, strict=True)),
-        rms_px=dict(found.rms_px),
-        stated_px=dict(found.stated_px),
-        limit_px=found.limit_px,
         causes=causes,
-        steps=found.steps,
         depth_error=found.depth_error if isfinite(found.depth_error) else None,
     )
 

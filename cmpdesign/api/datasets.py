@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypedDict, Unpack
 
+from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.options import Channels, Preset, Response, Side, Usual, Written, settled
 
 if TYPE_CHECKING:
-    from cmpdesign.data.folder import Progress
     from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from extractor import LayoutLike
@@ -30,13 +30,14 @@ class ReadingOptions(TypedDict, total=False):
 
 def dataset(
     plan: str | Path,
-    output: Annotated[str | Path, Written(metavar="FOLDER", needed=False)],
+    output: Annotated[str | Path | None, Written(metavar="FOLDER")] = None,
     *,
     shards: Annotated[str | int | None, Written(metavar="N|A:B")] = None,
     scheduler: Annotated[str, Written(metavar="local|dask=ADDRESS")] = "local",
     workers: Annotated[int | None, Written(least=1)] = None,
     inputs_from: Annotated[Sequence[str | Path], Written(metavar="FOLDER")] = (),
-) -> DatasetDocument:
+    check: bool = False,
+) -> DatasetDocument | DatasetCheckDocument:
     """Make a data set: pictures, truth, markers, forces and parameters of the frames that a plan names.
 
     The same call continues an interrupted data set. A program that calls this with the scheduler "local" needs
@@ -47,24 +48,36 @@ def dataset(
     >>> frames[0].image, frames[0].arrays["true_xy_px"], frames[0].values["force_n"]
 
     Args:
-        plan: a TOML file, or the name of a plan template.
+        plan: a TOML file, or the name of a plan template; with ``check`` the folder of a data set.
         output: data set: a new folder, or one of the same plan.
         shards: only the first N shards, or those from A to below B; None: all.
         scheduler: the machine that works: "local", this machine, or a dask scheduler by address or scheduler file.
         workers: number of processes on this machine; None: one for each core.
         inputs_from: folder, beside the plan's, whose pictures and height maps the plan may take; they become a part of
             the data set.
+        check: only compare all files of a data set with their digests.
 
     Raises:
         CmpDesignError: the plan cannot be carried out, or workers were lost.
         OutputError: a file cannot be written; finished shards are kept.
     """
+    from cmpdesign.data import check as check_folder
     from cmpdesign.data.run import make_dataset, parse_shards
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.design.templates import find_plan
+    from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
 
+    if check:
+        if output or shards or inputs_from:
+            raise CmpDesignError(
+                f"{parameter('check')} takes the folder of a data set alone; leave out the other options"
+            )
+        return DatasetCheckDocument.of(check_folder(plan), folder=str(plan))
+    if output is None:
+        raise CmpDesignError(f"{parameter('output')} is missing; give the folder of the data set")
     where = parse_scheduler(scheduler, workers)
-    return _document(output, make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from))
+    made = make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from)
+    return DatasetDocument.of(made, written=str(output))
 
 
 def extract(
@@ -98,37 +111,9 @@ def extract(
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.data.videos.extraction import FrameReading
+    from cmpdesign.documents.data import DatasetDocument
 
     texts = [str(text) for text in ([sources] if isinstance(sources, str | Path) else sources)]
     how, where = FrameReading(**settled(ReadingOptions, reading)), parse_scheduler(scheduler, workers)
     made = extract_markers(reference_from(layout), texts, output, how, where, frames_a_shard)
-    return _document(output, made)
-
-
-def check_dataset(folder: str | Path) -> DatasetCheckDocument:
-    """Compare all files of a data set with their digests, as ``dataset --check`` does."""
-    from cmpdesign.data import check
-    from cmpdesign.documents.data import DatasetCheckDocument
-
-    found = check(folder)
-    return DatasetCheckDocument(
-        folder=str(folder),
-        shards=found.shards,
-        of_shards=found.of_shards,
-        frames=found.frames,
-        bytes=found.bytes,
-        problems=list(found.problems),
-    )
-
-
-def _document(folder: str | Path, made: Progress) -> DatasetDocument:
-    from cmpdesign.documents.data import DatasetDocument
-
-    return DatasetDocument(
-        written=str(folder),
-        frames=made.frames,
-        shards=made.shards,
-        of_shards=made.of_shards,
-        redrawn=made.redrawn,
-        bytes=made.bytes,
-    )
+    return DatasetDocument.of(made, written=str(output))

@@ -54,13 +54,8 @@ def calibrate_gel(
     return CalibrateGelDocument.of(
         gel,
         written=str(output or ""),
-        digest=gel.digest,
         markers=len(gel.matrix) // 3,
         loads=len(gel.loads_mm),
-        thickness_mm=gel.thickness_mm,
-        poisson=gel.poisson,
-        marker_depth_mm=gel.marker_depth_mm,
-        margin_mm=gel.margin_mm,
     )
 
 
@@ -76,8 +71,6 @@ def calibrate_force(run: str | Path, weights: str | Path) -> CalibrateForceDocum
     Raises:
         CmpDesignError: a file that cannot be read, a run without forces, or weights that do not determine the modulus.
     """
-    from dataclasses import asdict
-
     import numpy as np
 
     from cmpdesign.api.sequences import load_run
@@ -101,4 +94,4 @@ def calibrate_force(run: str | Path, weights: str | Path) -> CalibrateForceDocum
     good = arrays["contact_reason"][at] == ContactReason.NONE
     force = np.where(good, -arrays["force_n"][at, 2], np.nan)
     scale = fit_force_scale(known, force, arrays["force_cov_n2"][at, 5], float(arrays["young_mpa"]))
-    return CalibrateForceDocument(**asdict(scale))
+    return CalibrateForceDocument.of(scale)

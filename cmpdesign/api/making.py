@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.options import Preset, Written
@@ -13,9 +13,16 @@ from cmpdesign.products.registry import USUAL_NAMES, chosen_products
 if TYPE_CHECKING:
     from cmpdesign.api.designs import Design
     from cmpdesign.design.design import Design as Parameters
-    from cmpdesign.documents.designs import BuildDocument, CheckDocument, InitDocument
+    from cmpdesign.documents.designs import (
+        BuildDocument,
+        CheckDocument,
+        InitDocument,
+        TemplateDocument,
+        TemplatesDocument,
+    )
 
 CAMERA_PX = (640, 480)
+TemplateKind = Literal["designs", "scenes", "plans", "machines", "materials", "silicones", "sensors"]
 
 
 def build(
@@ -49,7 +56,7 @@ def build(
         OutputError: a file cannot be written.
     """
     from cmpdesign.api.designs import checked_camera
-    from cmpdesign.documents.designs import BuildDocument, finding_parts, reading_parts
+    from cmpdesign.documents.designs import BuildDocument
     from cmpdesign.layout.report import report_values
     from cmpdesign.products.building import build_files
 
@@ -63,8 +70,7 @@ def build(
         written=tuple(map(str, built.written)),
         removed=tuple(map(str, built.removed)),
         report={name: value for name, value in report_values(built.report).items() if name != "findings"},
-        as_made=reading_parts(built.readings),
-        findings=finding_parts(built.findings),
+        as_made={name: reading.figures() for name, reading in built.readings.items()},
     )
 
 
@@ -86,7 +92,7 @@ def check(
         read: draw and read the pads that laser, mold and print would make.
     """
     from cmpdesign.api.designs import checked_camera
-    from cmpdesign.documents.designs import CheckDocument, finding_parts, reading_parts
+    from cmpdesign.documents.designs import CheckDocument
     from cmpdesign.products.building import check_products
 
     chosen = _design(design, overrides)
@@ -95,9 +101,8 @@ def check(
         checked,
         digest=chosen.layout.digest,
         passed=checked.works,
-        as_made=reading_parts(checked.readings),
-        not_read=dict(checked.unread),
-        findings=finding_parts(checked.findings),
+        as_made={name: reading.figures() for name, reading in checked.readings.items()},
+        not_read=checked.unread,
     )
 
 
@@ -174,20 +179,46 @@ def _sensor_text(file: Path, layout: Path, cameras: Sequence[Path]) -> str:
     return text
 
 
-def schema() -> dict[str, Any]:
-    """The JSON Schema of a design's TOML file, for editors, as the command ``schema`` prints it."""
-    from cmpdesign.design.design import design_schema
+def schema(command: str = "") -> dict[str, Any]:
+    """The JSON Schema of a design's TOML file, for editors, or of the document that a command prints with ``--json``.
 
-    return design_schema()
+    Args:
+        command: words of a command, as "evaluate designs"; "message": the lines on stderr; empty: a design's TOML file.
 
-
-def templates() -> dict[str, Design]:
-    """The design templates by name, as the command ``templates`` lists them.
-
-    >>> templates()["tac3d"].layers
-    10
+    Raises:
+        CmpDesignError: no such command.
     """
-    from cmpdesign.api.designs import load
-    from cmpdesign.design import templates as shipped
+    from cmpdesign.design.design import design_schema
+    from cmpdesign.documents.registry import document_schema
 
-    return {name: load(name) for name in shipped.templates()}
+    return document_schema(command) if command else design_schema()
+
+
+def templates(
+    kind: TemplateKind | None = None, show: Annotated[str | None, Written(metavar="NAME")] = None
+) -> TemplatesDocument | TemplateDocument:
+    """List or show the templates.
+
+    >>> [one.name for one in cmpdesign.templates("scenes").templates]
+
+    Args:
+        kind: list templates of one kind; None: all.
+        show: print the TOML file of a template; as "sensors/tac3d" where two kinds share a name.
+
+    Raises:
+        DesignError: no such template.
+    """
+    from cmpdesign.design.templates import find_template, template_kinds, template_words
+    from cmpdesign.documents.designs import TemplateDocument, TemplatesDocument
+    from cmpdesign.inputs.files import read_text
+
+    if show is not None:
+        found, path = find_template(show if kind is None or "/" in show else f"{kind}/{show}")
+        return TemplateDocument(kind=found, name=path.stem, text=read_text(path))
+    listed = [
+        {"kind": each, "name": name, **template_words(path)._asdict()}
+        for each, names in template_kinds().items()
+        if kind in (None, each)
+        for name, path in names.items()
+    ]
+    return TemplatesDocument.model_validate({"templates": listed})

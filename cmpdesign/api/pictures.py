@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypedDict, Unpack
 
-from cmpdesign.errors import CmpDesignError
-from cmpdesign.inputs.files import MAX_PIXELS
-from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written, settled
+from cmpdesign.errors import CmpDesignError, parameter
+from cmpdesign.inputs.files import require_suffix
+from cmpdesign.inputs.options import Response, Usual, Written, settled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cmpdesign.documents.runs import RenderDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
-    from cmpdesign.products.sheet.verdict import SheetVerdict
-    from cmpdesign.reading.problem_report import ProblemReport
-    from cmpdesign.reading.verify import Verdict
-    from cmpdesign.scene import Rendered, Scene
+    from cmpdesign.scene import Scene
     from cmpdesign.scene.files.scene_file import SceneFile
-    from extractor import Extractor, LayoutLike, Reference
+    from extractor import LayoutLike
+
+    OneImage = str | Path | NDArray[Any]
 
 SIZE_PX = (640, 480)
+# Where scene files have the properties of a plain picture; the others have the same name in [camera].
+SCENE_FILE_TABLES = {
+    "press_mm": "surface.press",
+    "press_radius_mm": "surface.press",
+    "blur_px": "optics",
+    "noise": "sensor",
+    "response": "sensor",
+}
+SCENE_FILE_KEYS = {"press_mm": "depth_mm", "press_radius_mm": "radius_mm"}
 
 
 class ViewOptions(TypedDict, total=False):
@@ -116,255 +125,122 @@ def load_scene(
 def render(
     layout: LayoutLike | AnyLayout,
     scene: Annotated[str | Path | None, Written(metavar="FILE")] = None,
+    output: Annotated[str | Path | None, Written(metavar="IMAGE", needed=True)] = None,
+    truth: Annotated[str | Path | None, Written(metavar="FILE")] = None,
     *,
     size: Annotated[tuple[int, int] | None, Written(metavar="WxH", most=9999)] = None,
     seed: Annotated[int | None, Written(least=0)] = None,
     **view: Unpack[ViewOptions],
-) -> Rendered:
+) -> RenderDocument:
     """Render a pattern as a camera sees the pattern. The picture is seeded, and exact to a thousandth of a pixel.
 
     >>> rendered = cmpdesign.render(layout, pitch_px=22, rotation_deg=12, tilt_deg=15, noise=2, seed=1)
     >>> rendered.image, rendered.truth.marker_xy_px       # (H, W, 3) uint8 BGR; (M, 2) px
-    >>> cmpdesign.render(layout, "pressed-ball").save("pressed.png", truth="pressed.npz")
+    >>> cmpdesign.render(layout, "pressed-ball", "pressed.png", truth="pressed.npz")
+    >>> cmpdesign.render(layout, "press-and-twist", "frames").frames
 
     Args:
         layout: the pattern's layout.json; or a layout, a ``Reference``, the JSON object of a layout file.
         scene: scene TOML, or the name of a scene template: flat-print, press-and-twist, pressed-ball,
             tac3d-binocular; None: the plain picture of the other options.
+        output: image (.png, .tif, .bmp, .webp, .jpg); of a sequence a video (.mp4, .avi, .mkv) or a folder; None: none,
+            of a picture.
+        truth: NPZ file for the markers' true places.
         size: width and height in pixels; None: the scene's, or 640x480.
         seed: seed of all random parts; None: the scene's, or 0.
         view: see ``ViewOptions``; only without ``scene``, whose file has these values.
 
-    Raises:
-        CmpDesignError: no such scene, or a value that cannot be rendered; a scene that is a sequence, which
-            ``render_sequence`` draws; ``view`` beside ``scene``.
-    """
-    from cmpdesign.scene import render as draw
-
-    if scene is None:
-        return draw(plain_scene(layout, seed or 0, **view), size=size or SIZE_PX)
-    if view:
-        raise CmpDesignError(
-            f"{next(iter(view))} cannot be given with a scene; write the value into the scene's file, or give no scene"
-        )
-    file = load_scene(scene, layout, size, seed)
-    if file.fps is not None:
-        raise CmpDesignError(f"{scene} is a sequence of {file.frames} frames; draw it with render_sequence")
-    return draw(file.scene(), size=file.size_px)
-
-
-def render_sequence(
-    layout: LayoutLike | AnyLayout,
-    scene: str | Path,
-    output: str | Path,
-    truth: str | Path | None = None,
-    *,
-    size: tuple[int, int] | None = None,
-    seed: int | None = None,
-) -> dict[str, int]:
-    """Draw a scene that is a sequence into a video or a folder of images.
-
-    Args:
-        layout: see ``plain_scene``.
-        scene: a scene template's name or a TOML file with [sequence].
-        output: video (.mp4, .avi, .mkv) or folder to write.
-        truth: .npz file for the truth of all frames; None: none.
-        size, seed: see ``render``.
-
     Returns:
-        Warnings of doubtful parts, each with the number of its first frame.
+        The record of what is written, with ``image`` and ``truth`` of a picture; ``found`` is its ``Rendered``.
 
     Raises:
-        CmpDesignError: see ``render``; or a scene that is no sequence.
+        CmpDesignError: no such scene, or a value that cannot be rendered; an ending of ``output`` that does not suit
+            the scene; ``view`` beside ``scene``.
         OutputError: a file cannot be written.
     """
-    from cmpdesign.scene.files.sequence import write_sequence
-
+    require_suffix("truth", truth, ".npz")
+    if scene is None:
+        with _scene_errors_name_parameters():
+            plain = plain_scene(layout, seed or 0, **view)
+        return _render_picture(plain, size or SIZE_PX, output, truth)
+    for name in sorted(view):
+        key = f"[{SCENE_FILE_TABLES.get(name, 'camera')}] {SCENE_FILE_KEYS.get(name, name)}"
+        raise CmpDesignError(
+            f"{parameter(name)} cannot be given with {parameter('scene')}; write {key} into the file"
+        )
     file = load_scene(scene, layout, size, seed)
     if file.fps is None:
-        raise CmpDesignError(f"{scene} is one picture, no sequence; draw it with render")
-    return write_sequence(file, Path(output), None if truth is None else Path(truth))
+        return _render_picture(file.scene(), file.size_px, output, truth, file)
+    if output is None:
+        raise CmpDesignError(
+            f"{scene} is a sequence of {file.frames} frames; give {parameter('output')}, a video or a folder"
+        )
+    return _render_sequence(file, Path(output), truth)
 
 
-@dataclass(frozen=True, eq=False)
-class Verifier:
-    """Gives verdicts on pictures of one pattern, or of the pads of a family; the reader is made once.
+def _render_picture(
+    scene: Scene,
+    size_px: tuple[int, int],
+    output: str | Path | None,
+    truth: str | Path | None,
+    file: SceneFile | None = None,
+) -> RenderDocument:
+    """Draw a scene, which may be that of a file."""
+    import numpy as np
 
-    Attributes:
-        layouts: the layout, or the layouts of a family, see ``extractor.Extractor``.
-        min_share: share of the visible markers that must be measured, 0 to 1.
-        response: relation of light and values, see ``extractor.Extractor``.
-        channels: "bgr" or "rgb", the order of a picture's colors.
-        sheet_dpi: the pictures are print sheets of this resolution, instead of the files' own; 0: unknown; None:
-            pictures that show the code of a print sheet are judged as such.
-        max_pixels: largest picture that is read from a file, width x height.
-        preset: see ``extractor.Extractor``.
-    """
+    from cmpdesign.documents.runs import RenderDocument
+    from cmpdesign.files.images import require_image_kind
+    from cmpdesign.scene import render as draw
+    from cmpdesign.scene import save_truth
 
-    layouts: Reference | Sequence[Reference]
-    min_share: float = 0.9
-    response: Response | None = None
-    channels: Channels = "bgr"
-    sheet_dpi: float | None = None
-    max_pixels: int = MAX_PIXELS
-    preset: Preset = "balanced"
-
-    @property
-    def family(self) -> Sequence[Reference]:
-        """The layouts."""
-        return self.layouts if isinstance(self.layouts, Sequence) else (self.layouts,)
-
-    @property
-    def reference(self) -> Reference:
-        """The layout; of a family, the first one."""
-        return self.family[0]
-
-    @cached_property
-    def extractor(self) -> Extractor:
-        """The reader; made for the first picture."""
-        from extractor import Extractor
-
-        return Extractor(self.layouts, self.preset, self.response, "either")
-
-    def read(self, image: str | Path | NDArray[Any]) -> NDArray[Any]:
-        """The picture as (H, W, 3) BGR.
-
-        Raises:
-            ImageFileError: a file or an array that is no color picture.
-        """
-        from cmpdesign.files.images import read_image, require_color_picture
-
-        if isinstance(image, str | Path):
-            pixels: NDArray[Any] = read_image(image, self.max_pixels)
-        else:
-            pixels = require_color_picture(image)
-        return pixels[:, :, ::-1].copy() if self.channels == "rgb" else pixels
-
-    def judge(self, image: NDArray[Any], path: Path | None = None) -> Verdict | SheetVerdict:
-        """The verdict on a picture that ``read`` returns; ``path``: the picture's file, which may state the
-        resolution.
-        """
-        from cmpdesign.products.sheet.verdict import judge_sheet
-        from cmpdesign.reading.verify import verify as judge_pattern
-
-        sheet = judge_sheet(image, path, [one.digest for one in self.family], self.sheet_dpi)
-        if sheet.is_sheet or self.sheet_dpi is not None:
-            return sheet
-        return judge_pattern(self.extractor, image, self.min_share)
-
-    def verify(self, image: str | Path | NDArray[Any]) -> Verdict | SheetVerdict:
-        """Read and judge a picture: a file, or (H, W, 3) uint8 or uint16.
-
-        Raises:
-            ImageFileError: a file or an array that is no color picture.
-        """
-        return self.judge(self.read(image), Path(image) if isinstance(image, str | Path) else None)
+    if output is not None:
+        try:
+            require_image_kind(Path(output), 8 if file is None else file.bits)
+        except CmpDesignError as error:
+            raise CmpDesignError(f"{error} (the scene has no [sequence])" if file else str(error)) from None
+    rendered = draw(scene, size=size_px)
+    if output is not None:
+        rendered.save(output, truth)
+    elif truth is not None:
+        save_truth(rendered.truth, truth)
+    visible = np.atleast_2d(rendered.truth.visible).sum(axis=1).tolist()
+    written = [str(path) for path in (truth, output) if path is not None]
+    return RenderDocument.of(rendered, written=written, size_px=size_px, frames=1, fps=None, visible=visible)
 
 
-class VerifyOptions(TypedDict, total=False):
-    """Options of ``verify``: the attributes of ``Verifier``.
+class RenderedSequence(NamedTuple):
+    """What a sequence leaves beside its files: warnings, one of each kind."""
 
-    Keys:
-        min_share: share of the visible markers that must be measured.
-        sheet_dpi: the pictures are print sheets of this resolution (0: unknown); the files' own resolution is ignored.
-        preset, response, channels, max_pixels: see ``SequenceOptions``.
-    """
-
-    min_share: Annotated[float, Usual(0.9, least=0, most=1)]
-    sheet_dpi: Annotated[float | None, Usual(None, least=0)]
-    preset: Annotated[Preset, Usual("balanced")]
-    response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
-    channels: Annotated[Channels, Usual("bgr")]
-    max_pixels: Annotated[int, Usual(MAX_PIXELS, metavar="COUNT", least=256)]
+    warnings: tuple[str, ...]
 
 
-def verify(
-    layout: LayoutLike | AnyLayout | Sequence[LayoutLike | AnyLayout],
-    image: str | Path | NDArray[Any],
-    *,
-    report: str | Path | None = None,
-    **options: Unpack[VerifyOptions],
-) -> Verdict | SheetVerdict:
-    """Extract a picture and check the numbering, the colors, the share of measured markers and the side.
+def _render_sequence(file: SceneFile, output: Path, truth: str | Path | None) -> RenderDocument:
+    from cmpdesign.documents.runs import RenderDocument
+    from cmpdesign.scene.files.sequence import write_sequence
 
-    >>> verdict = cmpdesign.verify("out/layout.json", "out/sample.png")
-    >>> verdict.verified, verdict.reason, verdict.markers.xy_px[217]
-
-    For many pictures, ``Verifier(layout.reference()).verify(image)`` makes the reader once.
-
-    Args:
-        layout: a layout, the path of a layout file, a ``Reference``, or the JSON object of a layout file; or a list of
-            these, a family of pads with different codes: ``verdict.markers.code`` says which pad it is.
-        image: a file, or (H, W, 3) uint8 or uint16.
-        report: file (.zip) that bundles picture, layout, settings and stages, to send with a picture that is not
-            read; None: no file.
-        options: see ``VerifyOptions``.
-
-    Returns:
-        The verdict; of a picture of a print sheet a ``SheetVerdict`` with the scales and the skew of the print.
-
-    Raises:
-        ImageFileError: a file or an array that is no color picture.
-        CmpDesignError: ``min_share`` is not from 0 to 1; a report with several layouts.
-        extractor.LayoutError: a layout that cannot be read, or layouts that are no family.
-        OutputError: the report cannot be written.
-    """
-    from cmpdesign.api.layouts import reference_from
-
-    layouts = [layout] if isinstance(layout, str) or not isinstance(layout, Sequence) else list(layout)
-    verifier = Verifier([reference_from(one) for one in layouts], **options)
-    if report is not None and len(layouts) != 1:
-        raise CmpDesignError("report: a bundle holds one layout; give the layout of the pad")
-    verdict = verifier.verify(image)
-    if report is not None:
-        _write_report(verifier, _layout_text(layouts[0]), image, verdict, Path(report))
-    return verdict
+    kinds: dict[str, str] = {}  # by letters, without numbers: the first frame of each kind
+    for text, frame in write_sequence(file, output, None if truth is None else Path(truth)).items():
+        kind = "".join(letter for letter in text if letter.isalpha())
+        kinds.setdefault(kind, f"from frame {frame} ({file.time_s(frame):.3g} s) on: {text}")
+    return RenderDocument.of(
+        RenderedSequence(tuple(kinds.values())),
+        written=[str(path) for path in (truth, output) if path is not None],
+        size_px=file.size_px,
+        frames=file.frames,
+        fps=file.fps,
+        visible=None,
+    )
 
 
-def new_report(verifier: Verifier, layout_text: str) -> ProblemReport:
-    """The bundle of pictures, layout and settings, without a picture."""
-    from cmpdesign.reading.problem_report import ProblemReport
+@contextmanager
+def _scene_errors_name_parameters() -> Iterator[None]:
+    """Within this context, errors of a scene name the parameter instead of the scene's field."""
+    from cmpdesign.scene import SceneError
 
-    settings = {
-        "preset": verifier.preset,
-        "response": None if verifier.response is None else str(verifier.response),
-        "channels": verifier.channels,
-        "min_share": verifier.min_share,
-    }
-    return ProblemReport(layout_text, settings)
-
-
-def _write_report(
-    verifier: Verifier,
-    layout_text: str,
-    image: str | Path | NDArray[Any],
-    verdict: Verdict | SheetVerdict,
-    report: Path,
-) -> None:
-    """Write the bundle of one picture; an array is kept as PNG."""
-    from cmpdesign.files.images import to_png
-    from cmpdesign.inputs.files import read_file
-    from cmpdesign.reading.verify import Verdict
-    from extractor.draw import draw_stages
-
-    bundle = new_report(verifier, layout_text)
-    if isinstance(image, str | Path):
-        name, content = Path(image).name, read_file(image)
-    else:
-        name, content = "picture.png", to_png(image)
-    stages: Mapping[str, NDArray[Any]] = {}
-    if isinstance(verdict, Verdict):
-        stages = draw_stages(verifier.read(image), verifier.reference, verdict.markers)
-    bundle.add(name, content, verdict.to_json(), stages)
-    bundle.write(report)
-
-
-def _layout_text(layout: LayoutLike | AnyLayout) -> str:
-    """The text of a layout file as it is, or as a layout is written."""
-    if isinstance(layout, str | Path):
-        from cmpdesign.inputs.files import read_text
-
-        return read_text(layout)
-    from cmpdesign.api.layouts import layout_from
-
-    return layout_from(layout).to_json()
+    try:
+        yield
+    except SceneError as error:
+        text = str(error)
+        for name in ViewOptions.__annotations__:
+            text = re.sub(rf"^{SCENE_FILE_KEYS.get(name, name)}(?= is )", parameter(name), text)
+        raise SceneError(text) from None

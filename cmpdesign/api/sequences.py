@@ -184,12 +184,12 @@ def open_source(
 
 
 def cameras() -> CamerasDocument:
-    """List the cameras of this machine (Linux): names, serial numbers, formats, sizes, rates and ranges of settings.
+    """List the cameras: formats, sizes and rates, and the ranges of exposure, gain, white balance and focus.
 
     >>> [camera.name for camera in cmpdesign.cameras().cameras]
 
     Raises:
-        SourceError: this system has no V4L2.
+        SourceError: this system has no V4L2 (Linux).
     """
     from dataclasses import asdict
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from cmpdesign.design.design import Design as Parameters
     from cmpdesign.documents.reading import GridDocument, KerfDocument
     from cmpdesign.documents.runs import EvaluateDocument, ExportDocument
-    from cmpdesign.files.images import Image
-    from cmpdesign.products.laser.coupon.design import Coupon
 
 
 def kerf(
@@ -27,72 +25,39 @@ def kerf(
     face: Literal["front", "back"] | None = None,
     response: Response | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> KerfDocument:
+) -> KerfDocument | GridDocument:
     """Measure the kerf on a cut coupon.
+
+    Of a grid of settings, those that cut through are read.
 
     >>> found = cmpdesign.kerf("made/laser/coupon.json", "scan.png")
     >>> [(one.name, one.kerf_x_mm, one.kerf_y_mm) for one in found.patches]
+    >>> cmpdesign.kerf("made/laser/grid.json", "grid.jpg").best
 
     Args:
-        coupon: the coupon.json that build wrote.
-        photo: a photo or scan of the cut piece.
+        coupon: the coupon.json or grid.json that build wrote.
+        photo: a photo or scan of the cut piece; of a grid, with loose pieces pushed out.
         face: the face whose openings are seen; None: the face with the narrower openings, by the taper.
         response: response of the camera; None: the response in the file, else sRGB, corrected by the edges.
         max_pixels: see ``SequenceOptions``.
 
     Raises:
-        CmpDesignError: a file that cannot be read, or a picture that does not show the coupon.
+        CmpDesignError: a file that cannot be read, or a picture that does not show the coupon or the grid.
     """
-    from cmpdesign.documents.reading import KerfDocument
-    from cmpdesign.products.laser.coupon.photo import read_coupon
-    from cmpdesign.products.laser.coupon.stated_response import stated_response
-
-    cut, image = _piece(coupon, photo, max_pixels)
-    if cut.kind != "kerf":
-        raise CmpDesignError(
-            f"{coupon}: a grid of settings; give the coupon.json beside it, or call laser_grid"
-        )
-    with _naming(photo):
-        found = read_coupon(cut, image, response=response, stated=stated_response(Path(photo)), face=face)
-    return KerfDocument.of(found, **found.to_json(cut))
-
-
-def laser_grid(
-    coupon: str | Path,
-    photo: str | Path,
-    *,
-    response: Response | None = None,
-    max_pixels: int = MAX_PIXELS,
-) -> GridDocument:
-    """Read which settings cut through, in a photo of a burnt grid, as the command ``kerf`` does with a grid.json.
-
-    >>> found = cmpdesign.laser_grid("made/laser/grid.json", "grid.jpg")
-    >>> found.best, found.found.best.passes
-
-    Args:
-        coupon: the grid.json that a build wrote.
-        photo: photo or scan of the piece, with loose pieces pushed out.
-        response, max_pixels: see ``kerf``.
-
-    Raises:
-        CmpDesignError: a file that cannot be read, or a picture that does not show the grid.
-    """
-    from cmpdesign.documents.reading import GridDocument
-    from cmpdesign.products.laser.grid.reading import read_grid
-
-    burnt, image = _piece(coupon, photo, max_pixels)
-    if burnt.kind != "grid":
-        raise CmpDesignError(f"{coupon}: a coupon for the kerf; give the grid.json beside it")
-    with _naming(photo):
-        found = read_grid(burnt, image, response or "srgb")
-    return GridDocument.of(found, **found.to_json())
-
-
-def _piece(coupon: str | Path, photo: str | Path, max_pixels: int) -> tuple[Coupon, Image]:
+    from cmpdesign.documents.reading import GridDocument, KerfDocument
     from cmpdesign.files.images import read_image
     from cmpdesign.products.laser.coupon.design import load_coupon
+    from cmpdesign.products.laser.coupon.photo import read_coupon
+    from cmpdesign.products.laser.coupon.stated_response import stated_response
+    from cmpdesign.products.laser.grid.reading import read_grid
 
-    return load_coupon(Path(coupon)), read_image(photo, max_pixels, gray=True)
+    cut, image = load_coupon(Path(coupon)), read_image(photo, max_pixels, gray=True)
+    with _naming(photo):
+        if cut.kind == "grid":
+            grid = read_grid(cut, image, response or "srgb")
+            return GridDocument.of(grid, **grid.to_json())
+        found = read_coupon(cut, image, response=response, stated=stated_response(Path(photo)), face=face)
+    return KerfDocument.of(found, **found.to_json(cut))
 
 
 @contextmanager

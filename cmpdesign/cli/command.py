@@ -19,10 +19,9 @@ from cmpdesign.cli.terminal import (
     is_expected,
     print_error,
     print_origin,
-    shortened,
 )
 from cmpdesign.errors import CmpDesignError, spelled
-from cmpdesign.inputs.texts import visible
+from cmpdesign.inputs.texts import shortened, visible
 from cmpdesign.libraries import missing_library_text
 
 INTERRUPTED = "interrupted; every file that was written is complete"
@@ -86,7 +85,9 @@ class Command(TyperCommand):
     def _spelled(self, name: str, value: str | None) -> str:
         """A parameter as the command line writes it; a word of another command for what this command does not have."""
         written = {
-            each.name: each.opts[-1] if each.opts[-1].startswith("--") else each.name.upper()
+            each.name: " or ".join([*each.secondary_opts, each.opts[-1]])
+            if each.opts[-1].startswith("--")
+            else each.name.upper()
             for each in self.params
         }
         option = written.get(name, f"--{name.replace('_', '-')}")

@@ -32,6 +32,7 @@ Parse = Callable[[Any], Any]
 LAYOUT = "the pattern's layout.json"
 _ENTRY = re.compile(r"^    (?:    )?(\w+(?:, \w+)*): (.*(?:\n {8,}\S.*)*)", re.MULTILINE)
 _REQUIRED = inspect.Parameter.empty
+_CONTEXT = inspect.Parameter("ctx", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class _Taken:
         default: its default; ``_REQUIRED``: none.
         written: how the command line writes it.
         is_argument: it is given by its place.
+        is_key: it is a key of a record of options, which the call gets only if it is given.
     """
 
     name: str
@@ -51,6 +53,7 @@ class _Taken:
     default: Any
     written: Written
     is_argument: bool = False
+    is_key: bool = False
 
 
 def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Callable[[Takes], Run]:
@@ -78,9 +81,14 @@ def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Call
             if each.kind is each.KEYWORD_ONLY
         ]
         parsers = {each.name: _parser(each) for each in taken}
+        keys = {each.name for each in taken if each.is_key}
 
-        def command(**values: Any) -> None:
-            values = {name: parsers[name](each) if name in parsers else each for name, each in values.items()}
+        def command(ctx: typer.Context, **values: Any) -> None:
+            values = {
+                name: parsers[name](each) if name in parsers else each
+                for name, each in values.items()
+                if name not in keys or _is_given(ctx, name)
+            }
             if not doing:
                 run(**values)
                 return
@@ -94,7 +102,7 @@ def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Call
         placed = sum(each.is_argument for each in taken) + any(each.name == "output" for each in taken)
         modes = [each for each in extra if each.default is False]
         values = [each for each in extra if each.default is not False]
-        written = [*of_call[:placed], *values, *of_call[placed:], *modes]
+        written = [_CONTEXT, *of_call[:placed], *values, *of_call[placed:], *modes]
         command.__signature__ = inspect.Signature(written)  # type: ignore[attr-defined]
         command.__annotations__ = {each.name: each.annotation for each in written}
         command.__name__ = run.__name__
@@ -102,6 +110,11 @@ def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Call
         return command
 
     return decorated
+
+
+def _is_given(ctx: typer.Context, name: str) -> bool:
+    source = ctx.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
 
 
 class _Names(dict[str, Any]):
@@ -132,7 +145,7 @@ def _taken(call: Callable[..., Any]) -> Iterator[_Taken]:
             (record,) = get_args(kind)
             shared = SequenceOptions.__annotations__
             for option in sorted(options_of(record), key=lambda option: option.name in shared):
-                yield _Taken(option.name, option.type, option.usual.value, option.usual)
+                yield _Taken(option.name, option.type, option.usual.value, option.usual, is_key=True)
             continue
         if not isinstance(kind, UnionType) and get_origin(kind) is Annotated:
             kind, written = get_args(kind)
@@ -148,7 +161,8 @@ def _taken(call: Callable[..., Any]) -> Iterator[_Taken]:
 
 def _meanings(described: Any) -> dict[str, str]:
     """Name -> meaning of every argument or key in a docstring and in the docstrings that it names."""
-    found = dict(_meanings(SequenceOptions)) if described is not SequenceOptions else {}
+    found: dict[str, str] = {}
+    of_records = dict(_meanings(SequenceOptions)) if described is not SequenceOptions else {}
     names = getattr(described, "__globals__", None) or vars(inspect.getmodule(described))
     for entry, text in _ENTRY.findall(inspect.getdoc(described) or ""):
         meaning = " ".join(text.split())
@@ -160,8 +174,8 @@ def _meanings(described: Any) -> dict[str, str]:
             elif name in elsewhere:
                 found[name] = elsewhere[name]
         if elsewhere and isinstance(names[other[1]], type):  # type: ignore[index]
-            found |= elsewhere
-    return {"layout": LAYOUT, **found}
+            of_records |= elsewhere
+    return {"layout": LAYOUT, **of_records, **found}
 
 
 def _first_sentence(call: Callable[..., Any]) -> str:

@@ -12,16 +12,16 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
 from cmpdesign.cli.mode import current_mode
 from cmpdesign.errors import CmpDesignError, OutputError
-from cmpdesign.inputs.texts import visible
+from cmpdesign.inputs.texts import one_line, shortened, visible
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,18 +30,7 @@ if TYPE_CHECKING:
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
-# Of an error or a warning: no message of the program is as long; only texts from files and arguments can be longer.
-MAX_LINE_LETTERS = 1000
-_HEAD_LETTERS = 700  # letters before the cut; the remedy stands at the end of a line
 _STARTED = time.perf_counter()
-
-
-def shortened(text: str) -> str:
-    """The text, cut in the middle at ``MAX_LINE_LETTERS``."""
-    if len(text) <= MAX_LINE_LETTERS:
-        return text
-    gap = " ... "
-    return text[:_HEAD_LETTERS] + gap + text[len(text) - (MAX_LINE_LETTERS - _HEAD_LETTERS - len(gap)) :]
 
 
 def console(stderr: bool = False) -> Console:
@@ -65,14 +54,9 @@ def is_expected(error: BaseException) -> bool:
     return isinstance(error, CmpDesignError)
 
 
-def error_on_one_line(error: BaseException | str) -> str:
-    """The error's message: one line of printable characters, at most ``MAX_LINE_LETTERS``."""
-    return shortened(visible(" ".join(str(error).split())))
-
-
 def print_error(error: BaseException | str, exit_code: int = EXIT_BAD_INPUT) -> None:
     """Print an error on stderr."""
-    _print_message("error", error_on_one_line(error), exit_code=exit_code)
+    _print_message("error", one_line(error), exit_code=exit_code)
 
 
 def print_warning(text: str) -> None:
@@ -124,6 +108,25 @@ def say_table(rows: Mapping[str, str]) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     say(table)
+
+
+def say_columns(headings: Sequence[str], rows: Iterable[Sequence[str]], *, folds: bool = False) -> None:
+    """Print a table for people.
+
+    Args:
+        headings: of the columns; one that begins with ">" is of numbers, on the right.
+        rows: a text for each column.
+        folds: lines that are longer than the terminal is wide fold within their column.
+    """
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for heading in headings:
+        justify: Literal["left", "right"] = "right" if heading.startswith(">") else "left"
+        table.add_column(heading.removeprefix(">"), justify=justify, overflow="fold" if folds else "ellipsis")
+    for row in rows:
+        table.add_row(*row)
+    say(table, soft_wrap=not folds)
 
 
 def say_text(text: str) -> None:

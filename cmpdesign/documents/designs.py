@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
 from pydantic import Field
@@ -125,14 +124,3 @@ class InitDocument(Document):
     version: Literal[1] = 1
     written: str
     extends: str | None
-
-
-def finding_parts(findings: Iterable[Any]) -> tuple[FindingPart, ...]:
-    """The findings as parts of a document."""
-    names = FindingPart.model_fields
-    return tuple(FindingPart(**{name: getattr(finding, name) for name in names}) for finding in findings)
-
-
-def reading_parts(readings: Mapping[str, Any]) -> dict[str, PadReadingPart]:
-    """The readings of pads as parts of a document."""
-    return {name: PadReadingPart(**reading.figures()) for name, reading in readings.items()}

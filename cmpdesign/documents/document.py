@@ -29,8 +29,13 @@ class Document(DocumentPart):
 
     @classmethod
     def of(cls, found: object, **fields: Any) -> Self:
-        """The document of a value that is more than a document can hold, as arrays."""
-        made = cls(**fields)
+        """The document of a value that may be more than a document can hold, as arrays.
+
+        Required fields that are not given are the value's attributes of the same names, and so are those of its parts.
+        """
+        required = [name for name, field in cls.model_fields.items() if field.is_required()]
+        own = {name: getattr(found, name) for name in required if name not in fields}
+        made = cls.model_validate(own | fields, from_attributes=True)
         made._found = found
         return made
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from typing import Union
+from typing import Any, Union
 
 from pydantic import TypeAdapter
 
@@ -45,7 +44,7 @@ DOCUMENTS: Mapping[str, tuple[type[Document], ...]] = {
 }
 
 
-def document_schema_text(command: str) -> str:
+def document_schema(command: str) -> dict[str, Any]:
     """The JSON Schema of what a command prints with ``--json``, or of "message".
 
     Raises:
@@ -59,5 +58,4 @@ def document_schema_text(command: str) -> str:
             f"there are {known}"
         )
     schema = TypeAdapter(Union[models]).json_schema()  # type: ignore[arg-type]  # noqa: UP007
-    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

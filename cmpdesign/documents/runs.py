@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
 from cmpdesign.documents.document import Document, DocumentPart
 from cmpdesign.documents.reading import QualityPart
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 class FramesPart(DocumentPart):
@@ -253,6 +257,29 @@ class RenderDocument(Document):
     frames: int
     fps: float | None = Field(description="Frames per second of a sequence.")
     visible: tuple[int, ...] | None = Field(description="Visible markers, by view; null for a sequence.")
+
+    @property
+    def image(self) -> NDArray[Any]:
+        """The picture, (H, W, 3) BGR, uint8 (uint16 for a 16-bit sensor); not of a sequence."""
+        return self.found.image  # type: ignore[no-any-return]
+
+    @property
+    def truth(self) -> Any:
+        """The picture's ``Truth``: the true places of the markers; not of a sequence."""
+        return self.found.truth
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Doubtful parts."""
+        return self.found.warnings  # type: ignore[no-any-return]
+
+    def save(self, path: str | Path, truth: str | Path | None = None) -> None:
+        """Write the picture, and the truth where a file is given; see ``Rendered.save``."""
+        self.found.save(path, truth)
+
+    def _repr_png_(self) -> bytes | None:
+        """The picture, for notebooks."""
+        return None if self.visible is None else self.found._repr_png_()
 
 
 class ExportDocument(Document):

@@ -14,7 +14,7 @@ from cmpdesign.api.designs import Design
 from cmpdesign.design.commented_toml import design_toml
 from cmpdesign.design.design import design_schema, load_design
 from cmpdesign.design.templates import template_kinds, template_words, templates
-from cmpdesign.documents.designs import finding_parts
+from cmpdesign.documents.designs import FindingPart
 from cmpdesign.errors import CmpDesignError, DesignError
 from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.layout.checks import Finding, check_design
@@ -144,7 +144,7 @@ def design_document(asked: Mapping[str, Any]) -> dict[str, Any]:
 
 def finding_of(finding: Finding) -> dict[str, Any]:
     """A finding as in the documents, its line, and the fields that it names."""
-    (part,) = finding_parts([finding])
+    part = FindingPart.model_validate(finding, from_attributes=True)
     in_palette = any(word in finding.remedy for word in ("ink", "white", "black"))
     named = [*_fields_in(finding.remedy, False)] or [*_fields_in(finding.subject, in_palette)]
     return {**part.model_dump(), "text": str(finding), "fields": named}

@@ -1,15 +1,28 @@
-"""Pictures of the products: the pad as the camera sees it, and the paths of the laser with their times."""
+"""Pictures for the page: the pad as the camera sees it, the paths of the laser with their times, residuals."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmpdesign.files.images import to_png
 from cmpdesign.patterns.colors import COLORS
 from cmpdesign.studio.designs import Look, design_of
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from extractor import Markers, Reference
+
 BLUR_PX = 1.0
+RESIDUAL_SIGMAS = 8.0  # of black and white in a picture of residuals
+_FITTED_PIXELS = 40_000  # from which the light of the inks is estimated
+_OUTLIER_SIGMAS = 4.0  # of a pixel that shows something else than the pattern
+_MEDIAN_TO_SIGMA = 1.4826  # of normal errors
+_COVERED = 0.999  # share of a pixel that cells cover
+_POWERS = ((0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (2, 0))  # of y and x
+_PIXEL_VARIANCE = 1 / 12  # of a box
+_BLURS2_PX2 = (0.1**2, 20.0**2)  # that can be drawn
 _DECIMALS = 3  # of a path on the screen, mm
 
 
@@ -80,3 +93,68 @@ def laser_document(asked: Mapping[str, Any]) -> dict[str, Any]:
         "kerf_mm": job.setup.kerf_x_mm,
         "assumed": list(job.setup.assumed),
     }
+
+
+def residual_picture(image: NDArray[Any], reference: Reference, markers: Markers) -> NDArray[Any]:
+    """What a drawing of the found markers leaves of an image: dirt, glare, a cell of another color, a wrong place.
+
+    The cells between found markers are drawn with straight sides and the image's blur; the light of every ink is a
+    quadratic over the image (robust least squares).
+
+    Args:
+        image: (H, W, 3) uint8 BGR.
+        reference: the layout.
+        markers: of the image, with their ``stages``.
+
+    Returns:
+        (H, W, 3) uint8 BGR: 128 where nothing is left and outside of the cells, 0 and 255 at ``RESIDUAL_SIGMAS``
+        deviations of the residual.
+    """
+    import numpy as np
+
+    from extractor.image.response import light_of_values
+
+    light, values = light_of_values("srgb"), np.arange(256.0)
+    coverage = _ink_coverage(reference, markers, (image.shape[1], image.shape[0]))
+    shown = coverage.sum(axis=0) > _COVERED
+    picked = np.flatnonzero(shown)[:: max(1, int(shown.sum()) // _FITTED_PIXELS)]
+    rows, columns = (np.linspace(-1, 1, count) for count in shown.shape)
+    y, x = rows[picked // len(columns)], columns[picked % len(columns)]
+    terms = np.stack([y**i * x**j for i, j in _POWERS], axis=1)
+    matrix = np.einsum("kn,nt->nkt", coverage.reshape(len(coverage), -1)[:, picked], terms)
+    matrix, seen = matrix.reshape(len(picked), -1), image.reshape(-1, 3)[picked]
+    kept, sigma = np.ones(len(picked), np.bool_), np.ones(3)
+    for _ in range(2):
+        weights = np.linalg.lstsq(matrix[kept], light[seen[kept]], rcond=None)[0]
+        left = seen - np.interp(matrix @ weights, light, values)
+        sigma = np.maximum(_MEDIAN_TO_SIGMA * np.median(np.abs(left), axis=0), 0.5)
+        kept = (np.abs(left) < _OUTLIER_SIGMAS * sigma).all(axis=1)
+    table = np.zeros((3, 3, len(coverage), 3))  # of powers of y and x, inks and channels
+    table[tuple(zip(*_POWERS, strict=True))] = weights.reshape(len(coverage), len(_POWERS), 3).swapaxes(0, 1)
+    picture = np.full(image.shape, 128, np.uint8)
+    for channel in range(3):
+        levels = np.polynomial.polynomial.polygrid2d(rows, columns, table[..., channel])
+        left = image[..., channel] - np.interp((coverage * levels).sum(axis=0), light, values)
+        scaled = np.rint(128 + 127.5 / RESIDUAL_SIGMAS * left / sigma[channel])
+        picture[..., channel][shown] = np.clip(scaled, 0, 255)[shown]
+    return picture
+
+
+def _ink_coverage(reference: Reference, markers: Markers, size_px: tuple[int, int]) -> NDArray[Any]:
+    """(inks, H, W) float32, share of each pixel that the cells of an ink cover, blurred as the image is."""
+    import numpy as np
+
+    from cmpdesign.scene.drawing.coverage import draw_coverage
+    from cmpdesign.scene.drawing.paths import PolygonSegments
+    from cmpdesign.scene.parts.optics import make_point_spread
+
+    corners_px = markers.xy_px[reference.cell_corners]
+    known = np.isfinite(corners_px).all(axis=(1, 2))
+    corners_px, color = corners_px[known], reference.cell_color[known]
+    sides = np.concatenate([corners_px, np.roll(corners_px, -1, axis=1)], axis=2).reshape(-1, 4)
+    owner = np.repeat(np.arange(len(corners_px)), corners_px.shape[1])
+    values = (color[:, None] == np.unique(color)).astype(np.float64)
+    refined = markers.stages["refine"]  # its blur has the pixel of the image at the scale of refinement
+    blur2_px2 = refined.blur_px**2 - refined.appearance.scale**2 * _PIXEL_VARIANCE
+    spread = make_point_spread(float(np.sqrt(np.clip(blur2_px2, *_BLURS2_PX2))))
+    return draw_coverage(PolygonSegments(sides, owner), values, size_px, spread)

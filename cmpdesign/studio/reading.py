@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmpdesign.api.pictures import Verifier, verify
+from cmpdesign.api.verifying import Verifier, verify
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.files import read_file
 from extractor import Reference

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmpdesign.api.pictures import Verifier
+from cmpdesign.api.verifying import Verifier
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.atomic import write_file
 from cmpdesign.files.images import IMAGE_BITS, ImageFileError, read_image, to_jpeg
 from cmpdesign.inputs.documents import parse_json
 from cmpdesign.inputs.files import read_file
+from cmpdesign.studio.pictures import residual_picture
 from cmpdesign.studio.reading import MAX_PIXELS, StudioReading
 from cmpdesign.studio.recording import KINDS
 from extractor import Reference
@@ -215,8 +216,11 @@ class Readings:
         verifier, markers = reading.verifier, reading.markers
         image = verifier.read(reading.file)
         markers = markers if markers.stages else verifier.extractor.extract(image)
-        self._stages = (reading.key, draw_stages(image, verifier.reference, markers))
-        return self._stages[1]
+        stages = draw_stages(image, verifier.reference, markers)
+        if markers.found and "refine" in markers.stages:
+            stages["residual"] = residual_picture(in_8_bits(image), verifier.reference, markers)
+        self._stages = (reading.key, stages)
+        return stages
 
     def _forget(self, reading: StudioReading) -> None:
         self._readings.pop(reading.key, None)

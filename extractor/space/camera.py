@@ -19,15 +19,7 @@ from numpy.typing import NDArray
 from extractor._native import space as native
 from extractor.errors import RigError
 from extractor.space.lens import COUNTS, Lens, LensKind, LensTable
-from extractor.space.medium import (
-    NO_WINDOW,
-    Lines,
-    Medium,
-    PlacedWindow,
-    WindowPlane,
-    gel_depth_mm,
-    place_window,
-)
+from extractor.space.medium import NO_WINDOW, Lines, Medium, PlacedWindow, WindowPlane, place_window
 
 Array = NDArray[np.float64]
 
@@ -55,8 +47,8 @@ class Linearisation(NamedTuple):
 class PlacedViewTable(NamedTuple):
     """A placed view for native loops."""
 
-    focal_px: tuple[float, float]
-    centre_px: tuple[float, float]
+    focal_px: Array
+    centre_px: Array
     lens: LensTable
     rotation: Array
     shift_mm: Array
@@ -180,19 +172,22 @@ class View:
         return np.asarray(-self.R_camera_from_layout.T @ self.t_camera_from_layout_mm)
 
     @cached_property
-    def _placed_window(self) -> PlacedWindow | None:
-        """The window before this placed view; None in air."""
-        if self.medium is None:
-            return None
-        return place_window(self.medium, self.window, self.R_camera_from_layout, self.t_camera_from_layout_mm)
-
-    @cached_property
     def native(self) -> PlacedViewTable:
         """What native loops read of this placed view."""
-        window = NO_WINDOW if self._placed_window is None else self._placed_window
         rotation = np.ascontiguousarray(self.R_camera_from_layout)
         shift_mm = self.t_camera_from_layout_mm
-        return PlacedViewTable(self.focal_px, self.centre_px, self._lens.native, rotation, shift_mm, window)
+        return PlacedViewTable(
+            focal_px=np.array(self.focal_px),
+            centre_px=np.array(self.centre_px),
+            lens=self._lens.native,
+            rotation=rotation,
+            shift_mm=shift_mm,
+            window=(
+                NO_WINDOW
+                if self.medium is None
+                else place_window(self.medium, self.window, rotation, shift_mm)
+            ),
+        )
 
     @cached_property
     def _lens(self) -> Lens:
@@ -227,7 +222,7 @@ class View:
 
     def linearised(self, xyz_mm: Array) -> Linearisation:
         """The projections of points (N, 3) mm in the layout frame, and their derivatives by point and pose."""
-        return Linearisation(*native.linearise(self.native, np.ascontiguousarray(xyz_mm, np.float64)))
+        return native.linearise(self.native, np.ascontiguousarray(xyz_mm, np.float64))
 
     def normalised(self, xy_px: Array) -> Array:
         """(N, 2) undistorted X / Z, Y / Z of pixels (N, 2); NaN where the distortion has no inverse."""
@@ -238,14 +233,11 @@ class View:
 
         In air all lines start at the camera, behind a window at its inner face; NaN as in ``normalised``.
         """
-        return Lines(*native.rays(self.native, np.ascontiguousarray(xy_px, np.float64)))
+        return native.rays(self.native, np.ascontiguousarray(xy_px, np.float64))
 
     def is_ahead(self, xyz_mm: Array) -> NDArray[np.bool_]:
         """(N,) bool, which points (N, 3) mm of the layout frame lie before the camera, behind its window if any."""
-        if self._placed_window is None:
-            return np.asarray(xyz_mm @ self.R_camera_from_layout[2] + self.t_camera_from_layout_mm[2] > 0)
-        camera = xyz_mm @ self.R_camera_from_layout.T + self.t_camera_from_layout_mm
-        return np.isfinite(gel_depth_mm(self._placed_window, camera))
+        return native.are_ahead(self.native, np.ascontiguousarray(xyz_mm, np.float64))
 
 
 def counts_text(counts: tuple[int, ...]) -> str:

@@ -34,13 +34,7 @@ NAMES: dict[LensKind, tuple[str, ...]] = {
     "perspective": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"),
     "fisheye": ("k1", "k2", "k3", "k4"),
 }
-MAX_ITERATIONS = 60  # of Newton's method
-CONVERGED = 1e-13  # error in normalised coordinates, far below the accuracy of a pixel
-ACCEPTED = 1e-9  # error in normalised coordinates above which a point has no inverse
-MAX_HALVINGS = 12  # of a Newton step
 REAL_ROOT = 1e-9  # imaginary part of a real root, relative to the root
-START_RAD = 1.5  # largest angle from the axis at which the inverse of a fisheye lens starts
-AXIS = 1e-4  # radius below which t / r is a series
 
 
 class Distorted(NamedTuple):
@@ -56,17 +50,11 @@ class Distorted(NamedTuple):
 
 
 class LensTable(NamedTuple):
-    """A lens for native loops: 12 coefficients, and the limits of the inverse."""
+    """A lens for native loops, with 12 coefficients."""
 
     is_fisheye: bool
     k: tuple[float, ...]
     fold_radius: float
-    max_iterations: int
-    max_halvings: int
-    converged: float
-    accepted: float
-    start_rad: float
-    axis: float
 
 
 @dataclass(frozen=True)
@@ -102,21 +90,11 @@ class Lens:
     @cached_property
     def native(self) -> LensTable:
         """What native loops read."""
-        return LensTable(
-            self.kind == "fisheye",
-            self._all_coefficients,
-            self.fold_radius,
-            MAX_ITERATIONS,
-            MAX_HALVINGS,
-            CONVERGED,
-            ACCEPTED,
-            START_RAD,
-            AXIS,
-        )
+        return LensTable(self.kind == "fisheye", self._all_coefficients, self.fold_radius)
 
     def distort(self, direction: Array) -> Distorted:
         """The places of directions (N, 2), and their derivatives."""
-        return Distorted(*native.distort(self.native, np.ascontiguousarray(direction, np.float64)))
+        return native.distort(self.native, np.ascontiguousarray(direction, np.float64))
 
     def by_coefficients(self, direction: Array) -> Array:
         """(N, 2, K) derivatives of the places of directions (N, 2) by the coefficients."""
@@ -152,14 +130,14 @@ class Lens:
         """
         if self.kind == "perspective" and not any(self.coefficients):
             return xy.copy()
-        return np.asarray(native.undistort(self.native, np.ascontiguousarray(xy, np.float64)))
+        return native.undistort(self.native, np.ascontiguousarray(xy, np.float64))
 
 
 def _angle_and_share(square: Array) -> tuple[Array, Array]:
     """(N,) t = atan r, and t / r, of the squares of r."""
     radius = np.sqrt(square)
-    angle, near = np.arctan(radius), radius < AXIS
-    return angle, np.where(near, 1 - square / 3, angle / np.where(near, 1.0, radius))
+    angle = np.arctan(radius)
+    return angle, np.divide(angle, radius, out=np.ones_like(radius), where=radius > 0)
 
 
 def _least_positive_root(polynomial: Array) -> float:

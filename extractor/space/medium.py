@@ -23,9 +23,6 @@ from extractor.errors import RigError
 
 Array = NDArray[np.float64]
 
-MAX_ITERATIONS = 50  # of Newton's method; about 5 are needed
-CONVERGED = 1e-9  # last step, of 1 + q: the error is about its square
-TOUCHING_MM = 1e-9  # rounding of a pattern that lies on the window
 MAX_THICKNESS_MM, MAX_INDEX = 1000.0, 4.0
 
 
@@ -97,8 +94,8 @@ class WindowPlane(NamedTuple):
 
 
 class PlacedWindow(NamedTuple):
-    """A window's outer face in a camera's frame, its derivatives by the pattern's pose (see ``Linearisation``), and the
-    limits of Newton's method; native loops read it.
+    """A window's outer face in a camera's frame, and its derivatives by the pattern's pose (see ``Linearisation``);
+    native loops read it.
 
     Attributes:
         is_there: False in air.
@@ -117,9 +114,6 @@ class PlacedWindow(NamedTuple):
     distance_mm: float
     normal_by_pose: Array
     distance_by_pose: Array
-    max_iterations: int = MAX_ITERATIONS
-    converged: float = CONVERGED
-    touching_mm: float = TOUCHING_MM
 
 
 NO_WINDOW = PlacedWindow(False, 1.0, 0.0, 1.0, np.zeros(3), 0.0, np.zeros((3, 6)), np.zeros(6))
@@ -155,16 +149,6 @@ def place_window(medium: Medium, plane: WindowPlane | None, rotation: Array, shi
     distance_by_pose = shift_mm @ normal_by_pose + np.concatenate([np.zeros(3), normal])
     distance_mm = float(normal @ shift_mm) - medium.gel_mm - medium.window_mm
     return PlacedWindow(*layers, normal, distance_mm, normal_by_pose, distance_by_pose)
-
-
-def gel_depth_mm(window: PlacedWindow, xyz_mm: Array) -> Array:
-    """(N,) the gel between the window and points (N, 3) mm in the camera's frame.
-
-    NaN for points within the window, and for all points where the camera would stand within the medium.
-    """
-    depth = xyz_mm @ window.normal - window.distance_mm - window.window_mm
-    seen = (depth >= -TOUCHING_MM) & (window.distance_mm > 0)
-    return np.asarray(np.where(seen, np.maximum(depth, 0.0), np.nan))
 
 
 def cross_matrix(vectors: Array) -> Array:

@@ -20,34 +20,6 @@ from extractor.space.camera import Array, View, is_covariance, is_finite
 
 GATE_SIGMAS = 6.0  # misfit above which a point is not reported; chosen
 TOLERANCE_PX = 0.1  # error beyond the covariance where gridlines bend more than extraction can follow; chosen
-MIN_EIGENVALUE = 1e-13  # of an information matrix with a unit diagonal, for an inverse
-INFLATION_SIGMAS = 3.0  # misfit above which a point's covariance is inflated; chosen
-MAX_VIEWS = 8  # as in native/space/triangulation.hpp
-
-
-class TriangulationLimits(NamedTuple):
-    """Limits of the steps.
-
-    Attributes:
-        iterations: most steps of a point. Chosen.
-        converged: last step, in standard deviations. Chosen.
-        min_eigenvalue: see ``MIN_EIGENVALUE``. Derived: rounding.
-        min_ray_divergence: half the squared angle between two rays, below which they are parallel. Derived: rounding.
-        large_residual_px: residual of a point without a picture, so that a step there is refused. Chosen.
-        min_damping: after a refused step. Chosen.
-        inflation_sigmas: see ``INFLATION_SIGMAS``. Chosen.
-    """
-
-    iterations: int = 12
-    converged: float = 1e-5
-    min_eigenvalue: float = MIN_EIGENVALUE
-    min_ray_divergence: float = 1e-14
-    large_residual_px: float = 1e6
-    min_damping: float = 1e-3
-    inflation_sigmas: float = INFLATION_SIGMAS
-
-
-LIMITS = TriangulationLimits()
 
 
 class Gate(NamedTuple):
@@ -76,9 +48,10 @@ class Points:
 
     Attributes:
         xyz_mm: (N, 3) float64, NaN where unknown.
-        cov_mm2: (N, 3, 3) float64, from the pixels' covariances alone; times the square of a misfit above 3.
+        cov_mm2: (N, 3, 3) float64, from the pixels' covariances alone, times ``inflation``.
         by_pose: (N, 3, 6 V) float64, derivatives by the views' poses.
         misfit: (N,) float64, the RMS residual in its standard deviations; NaN where unknown.
+        inflation: (N,) float64, the square of a misfit above 3, else 1.
         reason: (N,) uint8, a ``PointReason`` each.
     """
 
@@ -86,6 +59,7 @@ class Points:
     cov_mm2: Array
     by_pose: Array
     misfit: Array
+    inflation: Array
     reason: NDArray[np.uint8]
 
 
@@ -109,19 +83,18 @@ def triangulate(
         max_sigma_mm: standard deviation in the worst direction, above which a point is ``PARALLEL``.
         gate_sigmas: misfit above which a point is ``DISAGREE``,
         tolerance_px: if the norm of its residuals over all views is also above this.
+
+    Raises:
+        ValueError: more than 8 views.
     """
-    if len(views) > MAX_VIEWS:
-        raise ValueError(f"{len(views)} views; at most {MAX_VIEWS} are triangulated")
     cov_pose = np.zeros((6 * len(views), 6 * len(views))) if cov_pose is None else cov_pose
-    found = native.triangulate(
+    return native.triangulate(
         tuple(view.native for view in views),
         np.ascontiguousarray(xy_px),
         np.ascontiguousarray(cov_px2),
         np.ascontiguousarray(cov_pose),
         Gate(max_sigma_mm, gate_sigmas, tolerance_px),
-        LIMITS,
     )
-    return Points(*found)
 
 
 def deviating_moves(
@@ -144,7 +117,7 @@ def deviating_moves(
     linearised = [view.linearised(xyz_mm) for view in views]
     by_point = np.nan_to_num(np.stack([one.by_point for one in linearised]))
     design = np.swapaxes(by_point, 2, 3) @ weight
-    inverse = np.nan_to_num(_scaled_inverse((design @ by_point).sum(axis=0)), posinf=0.0)
+    inverse = np.nan_to_num(native.inverses((design @ by_point).sum(axis=0)), posinf=0.0)
     out = np.zeros((len(deviating), *xyz_mm.shape))
     for k, others in enumerate(deviating):
         shown = np.stack(
@@ -154,16 +127,3 @@ def deviating_moves(
         out[k] = -(inverse @ pulled)[..., 0]
     out[:, ~is_finite(xyz_mm)] = np.nan
     return out
-
-
-def _scaled_inverse(normal: Array) -> Array:
-    """(N, 3, 3) inverses of symmetric matrices in their own scale; infinite variances where singular."""
-    inverse = np.tile(np.diag(np.full(3, np.inf)), (len(normal), 1, 1))
-    diagonal = np.diagonal(normal, axis1=1, axis2=2)
-    positive = is_finite(normal, 2) & (diagonal > 0).all(axis=1)
-    root = np.sqrt(diagonal[positive])
-    scale = root[:, :, None] * root[:, None, :]
-    correlation = normal[positive] / scale
-    regular = np.linalg.eigvalsh(correlation)[:, 0] > MIN_EIGENVALUE
-    inverse[np.flatnonzero(positive)[regular]] = np.linalg.inv(correlation[regular]) / scale[regular]
-    return inverse

@@ -11,7 +11,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cmpdesign.documents.registry import document_schema_text
+from cmpdesign.documents.registry import document_schema
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluation.journal import Journal
 from cmpdesign.files.earlier_files import LIST_NAME, files_with_lists, find_stale_files
@@ -64,7 +64,7 @@ def test_the_file_of_a_summary_has_the_schema_that_is_published(tmp_path: Path) 
     result = run("track", made / "layout.json", made / "frames", "-o", tmp_path / "a.npz", "--frames", 2)
     assert result.exit_code == 0, result.output
     summary = json.loads((tmp_path / "a.npz.summary.json").read_text(encoding="utf-8"))
-    validator = jsonschema.Draft202012Validator(json.loads(document_schema_text("track")))
+    validator = jsonschema.Draft202012Validator(document_schema("track"))
     validator.validate(summary)
     refused = 0
     for name in summary:

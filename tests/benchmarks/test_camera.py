@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -71,10 +72,17 @@ def test_an_undisturbed_picture_is_the_scenes() -> None:
     np.testing.assert_array_equal(picture.visible, plain.truth.visible)
 
 
+TILTED = Chain(pose=Pose(tilt_deg=20.0), seed=5)
+
+
+@cache
+def tilted_picture() -> np.ndarray:
+    return shoot(TILTED).image.astype(int)
+
+
 @pytest.mark.parametrize("name", EFFECTS)
 def test_every_effect_changes_the_picture_by_its_strength(name: str) -> None:
-    chain = Chain(pose=Pose(tilt_deg=20.0), seed=5)
-    plain = shoot(chain).image.astype(int)
+    chain, plain = TILTED, tilted_picture()
     nothing = shoot(EFFECTS[name](chain, 0.0, np.random.default_rng(1))).image
     assert np.abs(nothing - plain).max() <= 1
     mild, hard = (shoot(EFFECTS[name](chain, s, np.random.default_rng(1))).image for s in (0.3, 1.0))

@@ -18,7 +18,7 @@ ROOMS = {
     "cmpdesign": {
         "designs and layouts": "designs making layouts proposal",
         "files, workshop and experiments": "layout files products workshop",
-        "pictures": "pictures plots",
+        "pictures": "pictures verifying plots",
         "sequences": "sequences tracking inputs",
         "sensors of a robot": "runtime",
         "calibration and force": "calibration force",

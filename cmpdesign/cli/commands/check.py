@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cmpdesign.api import making
 from cmpdesign.cli.commands.build import EXIT_NOT_PASSED
 from cmpdesign.cli.derived import derived
-from cmpdesign.cli.terminal import print_warning, say
+from cmpdesign.cli.terminal import print_warning, say, say_columns
 
 if TYPE_CHECKING:
     from cmpdesign.documents.designs import CheckDocument
@@ -35,15 +35,11 @@ def check(done: CheckDocument) -> int:
 
 
 def _print_findings(findings: Sequence[Finding]) -> None:
-    from rich.table import Table
-
     if not findings:
         say("no findings: the design can be made and read")
         return
-    table = Table(box=None, pad_edge=False)
-    for heading in ("severity", "what", "value", "limit", "unit", "remedy"):
-        table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
-    for finding in findings:
-        numbers = (f"{finding.value:.3g}", f"{finding.limit:.3g}")
-        table.add_row(finding.severity, finding.subject, *numbers, finding.unit, finding.remedy)
-    say(table, soft_wrap=False)
+    rows = [
+        (one.severity, one.subject, f"{one.value:.3g}", f"{one.limit:.3g}", one.unit, one.remedy)
+        for one in findings
+    ]
+    say_columns(("severity", "what", ">value", ">limit", "unit", "remedy"), rows, folds=True)

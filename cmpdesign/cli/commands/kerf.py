@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api import workshop
 from cmpdesign.cli.derived import derived
-from cmpdesign.cli.terminal import finish, print_step, printable_path, say
+from cmpdesign.cli.terminal import finish, print_step, printable_path, say, say_columns
 
 if TYPE_CHECKING:
     from cmpdesign.products.laser.coupon.design import Coupon
@@ -18,41 +18,30 @@ if TYPE_CHECKING:
 EXAMPLES = ("cmpdesign kerf coupon.json scan.png", "cmpdesign kerf grid.json photo.jpg --json")
 
 
-@derived(workshop.kerf, coupon="the coupon.json or grid.json that build wrote")
+@derived(workshop.kerf)
 def kerf(coupon: Path, photo: Path, **options: Any) -> None:
     """A grid of settings is read, too. The lines for the material's file are printed."""
     from cmpdesign.products.laser.coupon.design import load_coupon
 
-    cut_coupon = load_coupon(coupon)
+    cut_coupon, done = load_coupon(coupon), workshop.kerf(coupon, photo, **options)
     if cut_coupon.kind == "grid":
-        del options["face"]
-        grid = workshop.laser_grid(coupon, photo, **options)
-        _print_grid(cut_coupon, grid.found, photo)
-        finish(lambda: grid)
-        return
-    found = workshop.kerf(coupon, photo, **options)
-    print_step(f"{printable_path(photo)} is read")
-    reading = found.found
-    _print_kerf_table(cut_coupon, reading)
-    say(f"\nfor the file of {cut_coupon.material}, the settings of {cut_coupon.machine}:")
-    for patch_kerf in reading.patches:
-        say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
-    finish(lambda: found)
+        _print_grid(cut_coupon, done.found, photo)
+    else:
+        print_step(f"{printable_path(photo)} is read")
+        _print_kerfs(cut_coupon, done.found, photo)
+    finish(lambda: done)
 
 
 def _print_grid(grid: Coupon, reading: GridReading, photo: Path) -> None:
     """Print a grid's table, and the lines for the material's file."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
     counts = sorted({passes for one in reading.fields for passes in one.states})
-    for heading in ("field", "power", "speed", *(f"{count} x" for count in counts), "depth a pass"):
-        table.add_column(heading, justify="left" if heading == "field" else "right")
+    headings = ("field", ">power", ">speed", *(f">{count} x" for count in counts), ">depth a pass")
+    rows = []
     for one in reading.fields:
         windows = [_window_text(one, count) for count in counts]
         settings = (f"{one.power_percent:g} %", f"{one.speed_mm_s:g} mm/s")
-        table.add_row(one.name, *settings, *windows, _depth_text(one.depth_per_pass_mm))
-    say(table)
+        rows.append((one.name, *settings, *windows, _depth_text(one.depth_per_pass_mm)))
+    say_columns(headings, rows)
     if reading.best is None:
         say("\nno field cuts through with a pass in reserve: raise the power, or lower the speed")
     else:
@@ -89,9 +78,8 @@ def _settings_lines(one: FieldReading, photo: str) -> str:
     return "\n".join(f"{name} = {{ value = {value}, source = {source} }}" for name, value in values.items())
 
 
-def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
-    from rich.table import Table
-
+def _print_kerfs(coupon: Coupon, reading: CouponReading, photo: Path) -> None:
+    """Print a coupon's table, and the lines for the material's file."""
     side = "back" if reading.from_back else "front"
     say(
         f"seen from the {side}, {reading.scale_px_mm:.1f} px in a mm, marks fit to {1000 * reading.fit_mm:.1f} um, "
@@ -103,18 +91,19 @@ def _print_kerf_table(coupon: Coupon, reading: CouponReading) -> None:
         "degrees"
         f"{assumed}, through {coupon.thickness_mm:g} mm"
     )
-    table = Table(box=None, pad_edge=False)
-    for heading in ("patch", "power", "speed", "times over", "+-", "front x", "front y", "back x", "back y"):
-        table.add_column(heading, justify="left" if heading == "patch" else "right")
+    rows = []
     for one in reading.patches:
         patch = one.patch
         faces = [reading.at_face(face, width) for face in ("front", "back") for width in (one.x, one.y)]
         sigma_mm = max(one.x.sigma_mm, one.y.sigma_mm)
         settings = (f"{patch.power_percent:g} %", f"{patch.speed_mm_s:g} mm/s", str(patch.passes))
-        widths = [f"{width.value_mm:.4f}" for width in faces]
-        table.add_row(patch.name, *settings, f"{sigma_mm:.4f}", *widths)
-    say(table)
+        rows.append((patch.name, *settings, f"{sigma_mm:.4f}", *(f"{width.value_mm:.4f}" for width in faces)))
+    numbers = ("power", "speed", "times over", "+-", "front x", "front y", "back x", "back y")
+    say_columns(("patch", *(f">{name}" for name in numbers)), rows)
     say("kerfs in mm; x of cuts along y, y of cuts along x")
+    say(f"\nfor the file of {coupon.material}, the settings of {coupon.machine}:")
+    for patch_kerf in reading.patches:
+        say(_material_file_lines(reading, patch_kerf, photo.name), soft_wrap=True)
 
 
 def _material_file_lines(reading: CouponReading, patch_kerf: PatchKerf, photo: str) -> str:

@@ -145,7 +145,7 @@ def _draw_pattern(
 ) -> Planes:
     """(3, height, width) B, G, R, blurred: ground over background, inks over ground."""
     layout = scene.layout
-    drawn = np.flatnonzero((layout.cell_color != BLACK) & ~missing)
+    seen = np.flatnonzero((layout.cell_color != BLACK) & ~missing)
     polygons = layout.colored_outlines_mm[~missing[layout.colored_cells]]
     bleed_mm = scene.damage.bleed_mm if scene.damage else 0.0
     if bleed_mm:
@@ -157,10 +157,10 @@ def _draw_pattern(
     # Planes: B, G, R over black, the ground, and where cells overlap the sum of the inks' coverage.
     black = _light_bgr(scene, scene.ink(BLACK))
     inks = {
-        color: _light_bgr(scene, scene.ink(color)) - black for color in np.unique(layout.cell_color[drawn])
+        color: _light_bgr(scene, scene.ink(color)) - black for color in np.unique(layout.cell_color[seen])
     }
-    over_black = np.array([inks[color] for color in layout.cell_color[drawn]]).reshape(-1, 3)
-    values = np.zeros((1 + len(drawn), 5 if overlaps else 4))
+    over_black = np.array([inks[color] for color in layout.cell_color[seen]]).reshape(-1, 3)
+    values = np.zeros((1 + len(seen), 5 if overlaps else 4))
     values[0, 3] = 1.0
     values[1:, :3] = over_black
     if overlaps:
@@ -170,8 +170,11 @@ def _draw_pattern(
     colored, ground_share = covered[:3], covered[3]
     if overlaps:
         colored = colored / np.maximum(covered[4], 1.0)
-    black_plane = black.astype(np.float32)[:, None, None]
-    return np.asarray(colored + background + ground_share * (black_plane - background), dtype=np.float32)
+    behind = background if any(background.strides[1:]) else background[:, :1, :1]
+    drawn = np.asarray(colored, dtype=np.float32)
+    drawn += behind
+    drawn += ground_share * (black.astype(np.float32)[:, None, None] - behind)
+    return drawn
 
 
 def _draw_polygons(

@@ -66,13 +66,22 @@ def expose_sensor(
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """The image (H, W, 3) of encoded values (3, H, W) float32, 0 to 255, channels B, G, R; uint8 or uint16."""
     if sensor.noise:
-        noise = rng.standard_normal(values.shape, dtype=np.float32)
-        noise *= np.float32(sensor.noise)
-        values = noise + values
+        exposed = rng.standard_normal(values.shape, dtype=np.float32)
+        exposed *= np.float32(sensor.noise)
+        exposed += values
+    else:
+        exposed = values.copy()
     if sensor.bits == 16:
-        return _interleave_planes(np.clip(np.rint(values * 257), 0, 65535).astype(np.uint16))
-    eight = _interleave_planes(np.clip(np.rint(values), 0, 255).astype(np.uint8))
+        exposed *= 257
+        return _interleave_planes(_quantised(exposed, np.uint16))
+    eight = _interleave_planes(_quantised(exposed, np.uint8))
     return eight if sensor.jpeg_quality is None else _jpeg_roundtrip(eight, sensor.jpeg_quality)
+
+
+def _quantised(values: NDArray[np.float32], depth: type[Depth]) -> NDArray[Depth]:
+    """Whole numbers of the depth's range; ``values`` are overwritten."""
+    np.rint(values, out=values)
+    return np.clip(values, 0, np.iinfo(depth).max, out=values).astype(depth)
 
 
 def _interleave_planes(planes: NDArray[Depth]) -> NDArray[Depth]:

@@ -5,7 +5,7 @@
 import { h } from "./base.js";
 
 const PRESSED = [255, 32, 32], SHEAR_COLOR = "#ffe94a", MIN_SHEAR = 0.04; // of the largest
-const LIGHT = [-0.41, 0.41, 0.82], AMBIENT = 0.35, DIRECT = 0.8; // a flat cell has its own color
+const LIGHT = [-0.41, 0.41, 0.82], AMBIENT = 0.35, DIRECT = 0.8, HAZE = 14; // a flat cell has about its own color; black cells stand out from a dark page
 const DISTANCE = 3.7, FOCAL = 1.6, SEAM_PX = 0.5; // of the camera in radii of the pad, in sizes of the canvas; cells overlap so that no gap shows
 const STEP = Math.PI / 24, TURNS = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP] };
 
@@ -45,7 +45,7 @@ export class Surface {
     shown.sort((one, other) => one.depth - other.depth);
     for (const { ids, rgb } of shown) {
       const corners = ids.map((id) => row[id]), press = most ? (0.85 * corners.reduce((sum, at) => sum + Math.max(0, frame.pressure_mpa[at]), 0)) / 3 / most : 0, light = this.#light(corners);
-      context.fillStyle = `rgb(${rgb.map((value, axis) => Math.round(light * (value + press * (PRESSED[axis] - value))))})`;
+      context.fillStyle = `rgb(${rgb.map((value, axis) => Math.round(HAZE + light * (value + press * (PRESSED[axis] - value))))})`;
       this.#fill(context, corners);
     }
     if (frame.shear_mpa) this.#drawShear(context, frame, width, height);

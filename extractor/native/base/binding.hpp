@@ -10,7 +10,6 @@
 
 #include <array>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -33,58 +32,8 @@ struct Name {
   std::string text() const { return owner == nullptr ? own : owner->text() + "." + own; }
 };
 
-// What a call has borrowed from Python beside its arguments; given back when the call ends.
-class Borrowed {
- public:
-  Borrowed() = default;
-  Borrowed(const Borrowed&) = delete;
-  Borrowed& operator=(const Borrowed&) = delete;
-  ~Borrowed() {
-    for (Py_buffer& buffer : buffers_) PyBuffer_Release(&buffer);
-  }
-  const Py_buffer& add(PyObject* object, bool is_written, const Name& name) {
-    Py_buffer& buffer = buffers_.emplace_back();
-    int flags = PyBUF_STRIDES | PyBUF_FORMAT | (is_written ? PyBUF_WRITABLE : 0);
-    if (PyObject_GetBuffer(object, &buffer, flags) != 0) {
-      buffers_.pop_back();
-      PyErr_Clear();
-      throw nb::type_error(
-          (name.text() + " is no array" + (is_written ? " that can be written" : "")).c_str());
-    }
-    return buffer;
-  }
-  void keep(nb::object object) { objects_.push_back(std::move(object)); }
-
- private:
-  std::vector<Py_buffer> buffers_;
-  std::vector<nb::object> objects_;
-};
-
-template <class T>
-constexpr const char* dtype_name() {
-  if constexpr (std::is_same_v<T, bool>) return "bool";
-  if constexpr (std::is_same_v<T, double>) return "float64";
-  if constexpr (std::is_same_v<T, float>) return "float32";
-  if constexpr (std::is_same_v<T, std::int64_t>) return "int64";
-  if constexpr (std::is_same_v<T, std::int32_t>) return "int32";
-  if constexpr (std::is_same_v<T, std::int16_t>) return "int16";
-  if constexpr (std::is_same_v<T, std::int8_t>) return "int8";
-  if constexpr (std::is_same_v<T, std::uint64_t>) return "uint64";
-  if constexpr (std::is_same_v<T, std::uint32_t>) return "uint32";
-  if constexpr (std::is_same_v<T, std::uint16_t>) return "uint16";
-  if constexpr (std::is_same_v<T, std::uint8_t>) return "uint8";
-}
-
-template <class T>
-bool has_dtype(const Py_buffer& buffer) {
-  const char* format = buffer.format == nullptr ? "B" : buffer.format;
-  if (*format == '@' || *format == '=' || *format == '<') ++format;
-  if (format[0] == '\0' || format[1] != '\0' || buffer.itemsize != static_cast<Py_ssize_t>(sizeof(T)))
-    return false;
-  if constexpr (std::is_same_v<T, bool>) return *format == '?';
-  const std::string kinds = std::is_floating_point_v<T> ? "fd" : std::is_signed_v<T> ? "bhilq" : "BHILQ";
-  return kinds.find(*format) != std::string::npos;
-}
+// What a call has read from records, kept until it ends: a property may have made its array for this call.
+using Borrowed = std::vector<nb::object>;
 
 template <class T>
 struct FromPython;
@@ -93,47 +42,31 @@ template <class T, int N>
 struct FromPython<View<T, N>> {
   using Value = std::remove_const_t<T>;
 
-  static View<T, N> get(nb::handle object, const Name& name, Borrowed& borrowed) {
-    if (const NumpyArray* array = fitting_array(object.ptr()))
-      return strided({reinterpret_cast<T*>(array->data), array->shape, array->strides}, name);
-    const Py_buffer& buffer = borrowed.add(object.ptr(), !std::is_const_v<T>, name);
-    if (buffer.ndim != N || !has_dtype<Value>(buffer)) refuse(buffer, name);
-    return strided({static_cast<T*>(buffer.buf), buffer.shape, buffer.strides}, name);
-  }
-
- private:
-  // The memory of an array.
-  struct Memory {
-    T* data;
-    const Py_ssize_t *shape, *strides;  // strides in bytes
-  };
-
-  // The array of NumPy that an object is, of the right type and dimensions; null for others.
-  static const NumpyArray* fitting_array(PyObject* object) {
-    const NumpyArray* array = Numpy::get().array(object);
-    const bool is_fitting = array != nullptr && array->dimensions == N && Numpy::has_type<Value>(*array) &&
-                            (std::is_const_v<T> || Numpy::is_writable(*array));
-    return is_fitting ? array : nullptr;
-  }
-
-  static View<T, N> strided(const Memory& memory, const Name& name) {
+  static View<T, N> get(nb::handle object, const Name& name, Borrowed&) {
+    const NumpyArray* array = Numpy::get().array(object.ptr());
+    if (array == nullptr) throw nb::type_error((name.text() + " is no array").c_str());
+    if (array->dimensions != N || !Numpy::has_type<Value>(*array)) refuse(*array, name);
+    if (!std::is_const_v<T> && !Numpy::is_writable(*array))
+      throw nb::type_error((name.text() + " cannot be written").c_str());
+    T* const data = reinterpret_cast<T*>(array->data);
     std::array<Index, N> shape, stride;
-    std::copy_n(memory.shape, N, shape.begin());
-    if (std::find(shape.begin(), shape.end(), 0) != shape.end()) return {memory.data, shape};
+    std::copy_n(array->shape, N, shape.begin());
+    if (std::find(shape.begin(), shape.end(), 0) != shape.end()) return {data, shape};
     for (int k = 0; k < N; ++k) {
-      stride[k] = memory.strides[k] / static_cast<Index>(sizeof(T));
-      bool is_whole = memory.strides[k] % static_cast<Py_ssize_t>(sizeof(T)) == 0;
+      stride[k] = array->strides[k] / static_cast<Index>(sizeof(T));
+      bool is_whole = array->strides[k] % static_cast<Py_ssize_t>(sizeof(T)) == 0;
       bool has_gap = k == N - 1 && shape[k] > 1 && stride[k] != 1;
       if (!is_whole || has_gap)
         throw nb::type_error((name.text() + " has gaps within its rows; give a contiguous array").c_str());
     }
-    return {memory.data, shape, stride};
+    return {data, shape, stride};
   }
 
-  [[noreturn]] static void refuse(const Py_buffer& buffer, const Name& name) {
-    std::string text = name.text() + " must be " + dtype_name<Value>() + " of " + std::to_string(N) +
-                       " dimensions, and is '" + (buffer.format == nullptr ? "B" : buffer.format) + "' of " +
-                       std::to_string(buffer.ndim);
+ private:
+  [[noreturn]] static void refuse(const NumpyArray& array, const Name& name) {
+    std::string text = name.text() + " must be " + DTYPE<Value>.name + " of " + std::to_string(N) +
+                       " dimensions, and is '" + array.descriptor->type + "' of " +
+                       std::to_string(array.dimensions);
     throw nb::type_error(text.c_str());
   }
 };
@@ -142,74 +75,13 @@ template <class T>
   requires std::is_arithmetic_v<T>
 struct FromPython<T> {
   static T get(nb::handle object, const Name& name, Borrowed&) {
-    PyObject* source = object.ptr();
-    bool is_failed = false;
+    if constexpr (std::is_same_v<T, bool>) return PyObject_IsTrue(object.ptr()) == 1;
     T value{};
-    if constexpr (std::is_same_v<T, bool>) {
-      int truth = PyObject_IsTrue(source);
-      is_failed = truth < 0;
-      value = truth > 0;
-    } else if constexpr (std::is_floating_point_v<T>) {
-      double number = PyFloat_AsDouble(source);
-      is_failed = number == -1.0 && PyErr_Occurred() != nullptr;
-      value = static_cast<T>(number);
-    } else {
-      long long number =
-          PyIndex_Check(source) != 0 ? PyLong_AsLongLong(nb::steal(PyNumber_Index(source)).ptr()) : -1;
-      is_failed = PyIndex_Check(source) == 0 || (number == -1 && PyErr_Occurred() != nullptr);
-      value = static_cast<T>(number);
-      is_failed = is_failed || static_cast<long long>(value) != number;
-    }
-    if (is_failed) {
-      PyErr_Clear();
+    if (!nb::try_cast(object, value))
       throw nb::type_error((name.text() + " is no number of the type that is needed").c_str());
-    }
     return value;
   }
 };
-
-// -- to be removed with the last record of this kind
-class Field {
- public:
-  Field(nb::object value, Name name, Borrowed& borrowed)
-      : value_(std::move(value)), name_(name), borrowed_(borrowed) {}
-  template <class T>
-  operator T() const {
-    return FromPython<T>::get(value_, name_, borrowed_);
-  }
-
- private:
-  nb::object value_;
-  Name name_;
-  Borrowed& borrowed_;
-};
-
-class Fields {
- public:
-  Fields(nb::handle object, const Name& name, Borrowed& borrowed)
-      : object_(object), name_(name), borrowed_(borrowed) {}
-  Field operator[](const char* field) const {
-    return {nb::object(object_.attr(field)), Name{&name_, field}, borrowed_};
-  }
-
- private:
-  nb::handle object_;
-  const Name& name_;
-  Borrowed& borrowed_;
-};
-
-template <class T>
-concept OldRecord = requires(const Fields& fields) {
-  { T::read(fields) } -> std::same_as<T>;
-};
-
-template <OldRecord T>
-struct FromPython<T> {
-  static T get(nb::handle object, const Name& name, Borrowed& borrowed) {
-    return T::read(Fields(object, name, borrowed));
-  }
-};
-// --
 
 template <class T>
 concept Record = requires { T::FIELDS; };
@@ -278,7 +150,16 @@ struct FromPython<T> {
       throw nb::type_error((name.text() + " has no field " + own).c_str());
     }
     field = FromPython<Field>::get(value, Name{&name, own}, borrowed);
-    borrowed.keep(std::move(value));  // a property may have made its array for this call
+    borrowed.push_back(std::move(value));
+  }
+};
+
+// A value that may be None.
+template <class T>
+struct FromPython<std::optional<T>> {
+  static std::optional<T> get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    if (object.is_none()) return std::nullopt;
+    return FromPython<T>::get(object, name, borrowed);
   }
 };
 
@@ -292,7 +173,7 @@ struct FromPython<std::array<T, N>> {
     for (std::size_t k = 0; k < N; ++k) {
       nb::object item = object[k];
       values[k] = FromPython<T>::get(item, name, borrowed);
-      borrowed.keep(std::move(item));
+      borrowed.push_back(std::move(item));
     }
     return values;
   }
@@ -337,6 +218,11 @@ nb::object to_python(T&& record) {
   return nb::steal(object);
 }
 
+template <class T>
+nb::object to_python(std::optional<T>&& value) {
+  return value ? to_python(std::move(*value)) : nb::none();
+}
+
 template <class... T>
 nb::object to_python(std::tuple<T...>&& values) {
   return std::apply([](auto&&... value) { return nb::make_tuple(to_python(std::move(value))...); },
@@ -363,13 +249,18 @@ struct TypeName {
 template <class T, int N>
 struct TypeName<View<T, N>> {
   static std::string get() {
-    const std::string name = dtype_name<std::remove_const_t<T>>();
+    const std::string name = DTYPE<std::remove_const_t<T>>.name;
     return "numpy.typing.NDArray[numpy." + name + (name == "bool" ? "_]" : "]");
   }
 };
 
 template <class T, int N>
 struct TypeName<Array<T, N>> : TypeName<View<T, N>> {};
+
+template <class T>
+struct TypeName<std::optional<T>> {
+  static std::string get() { return TypeName<T>::get() + " | None"; }
+};
 
 template <class T, std::size_t N>
 struct TypeName<std::array<T, N>> {
@@ -432,7 +323,7 @@ struct Bound<F, Result (*)(Arguments...)> {
         "def " + std::string(name) + "(" + parameters + ") -> " + TypeName<Result>::get();
     module.def(
         name, [names, all](Handle<G>... given) { return call(names, Given{given...}, all); },
-        nb::arg(names[G])..., nb::sig(signature.c_str()));
+        nb::arg(names[G]).none()..., nb::sig(signature.c_str()));
   }
 
   template <class T>

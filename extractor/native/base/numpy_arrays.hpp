@@ -29,6 +29,33 @@ struct NumpyArray {
   int flags;
 };
 
+// A type of elements: NumPy's name and number of the type.
+struct Dtype {
+  const char* name;
+  int number;
+};
+
+constexpr int LONG = 7, LONGLONG = 9;
+
+template <class T>
+constexpr Dtype dtype() {
+  constexpr int int64 = std::is_same_v<long, std::int64_t> ? LONG : LONGLONG;
+  if constexpr (std::is_same_v<T, bool>) return {"bool", 0};
+  if constexpr (std::is_same_v<T, double>) return {"float64", 12};
+  if constexpr (std::is_same_v<T, float>) return {"float32", 11};
+  if constexpr (std::is_same_v<T, std::int8_t>) return {"int8", 1};
+  if constexpr (std::is_same_v<T, std::uint8_t>) return {"uint8", 2};
+  if constexpr (std::is_same_v<T, std::int16_t>) return {"int16", 3};
+  if constexpr (std::is_same_v<T, std::uint16_t>) return {"uint16", 4};
+  if constexpr (std::is_same_v<T, std::int32_t>) return {"int32", 5};
+  if constexpr (std::is_same_v<T, std::uint32_t>) return {"uint32", 6};
+  if constexpr (std::is_same_v<T, std::int64_t>) return {"int64", int64};
+  if constexpr (std::is_same_v<T, std::uint64_t>) return {"uint64", int64 + 1};
+}
+
+template <class T>
+constexpr Dtype DTYPE = dtype<T>();
+
 // What NumPy is asked for.
 class Numpy {
  public:
@@ -46,7 +73,7 @@ class Numpy {
   template <class T>
   nb::object create(T* data, int dimensions, const Py_ssize_t* shape, nb::object owner) const {
     constexpr int WITHOUT_GAPS = 0x1, ALIGNED = 0x100, WRITABLE = 0x400;
-    PyObject* array = create_(type_, dimensions, shape, type_number<T>(), nullptr, data, sizeof(T),
+    PyObject* array = create_(type_, dimensions, shape, DTYPE<T>.number, nullptr, data, sizeof(T),
                               WITHOUT_GAPS | ALIGNED | WRITABLE, nullptr);
     if (array == nullptr || set_base_(array, owner.release().ptr()) != 0) throw nb::python_error();
     return nb::steal(array);
@@ -59,7 +86,7 @@ class Numpy {
     const int found = descriptor.type_number;
     const bool is_twin = (found == LONG || found == LONGLONG) && sizeof(T) == sizeof(long long) &&
                          sizeof(long) == sizeof(long long) && std::is_signed_v<T> && std::is_integral_v<T>;
-    return (found == type_number<T>() || is_twin) && descriptor.byte_order != '>';
+    return (found == DTYPE<T>.number || is_twin) && descriptor.byte_order != '>';
   }
   static bool is_writable(const NumpyArray& array) { return (array.flags & 0x400) != 0; }
 
@@ -70,8 +97,6 @@ class Numpy {
 
   // places in NumPy's table of functions
   static constexpr int ARRAY_TYPE = 2, ARRAY_NEW = 93, SET_BASE = 282;
-  // numbers of its types
-  static constexpr int LONG = 7, LONGLONG = 9;
 
   Numpy() {
     PyObject* module = PyImport_ImportModule("numpy._core._multiarray_umath");
@@ -86,22 +111,6 @@ class Numpy {
     type_ = static_cast<PyTypeObject*>(entries[ARRAY_TYPE]);
     create_ = reinterpret_cast<Create>(entries[ARRAY_NEW]);
     set_base_ = reinterpret_cast<SetBase>(entries[SET_BASE]);
-  }
-
-  template <class T>
-  static constexpr int type_number() {
-    if constexpr (std::is_same_v<T, bool>) return 0;
-    if constexpr (std::is_same_v<T, double>) return 12;
-    if constexpr (std::is_same_v<T, float>) return 11;
-    if constexpr (std::is_same_v<T, std::int8_t>) return 1;
-    if constexpr (std::is_same_v<T, std::uint8_t>) return 2;
-    if constexpr (std::is_same_v<T, std::int16_t>) return 3;
-    if constexpr (std::is_same_v<T, std::uint16_t>) return 4;
-    if constexpr (std::is_same_v<T, std::int32_t>) return 5;
-    if constexpr (std::is_same_v<T, std::uint32_t>) return 6;
-    constexpr bool is_long = sizeof(long) == sizeof(std::int64_t);
-    if constexpr (std::is_same_v<T, std::int64_t>) return is_long ? LONG : LONGLONG;
-    if constexpr (std::is_same_v<T, std::uint64_t>) return is_long ? LONG + 1 : LONGLONG + 1;
   }
 
   PyTypeObject* type_;

@@ -19,9 +19,6 @@ struct PatternState {
   double dot_gain;                  // px
   View<const double, 2> ink_shift;  // (3, 2) of the inks in the layout, in units of the mean edge
   MarkerScatter scatter;
-
-  CMP_RECORD("extractor.refine.estimate.Estimate", xy, hidden, maps, roughness, bend, weight, sigma, noise,
-             dot_gain, ink_shift, scatter)
 };
 
 // Markers before refinement.

@@ -33,9 +33,6 @@ struct ProfileStep {
   double dot_gain;                  // px
   Array<double, 2> ink_shift;       // (3, 2) as in PatternState
   StepSolution solution;
-
-  CMP_RECORD("extractor.refine.profile_rounds.ProfileStep", profile_weight, weight, dot_gain, ink_shift,
-             solution)
 };
 
 // The measurements of a round of profiles, and the solution.

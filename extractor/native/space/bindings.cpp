@@ -1,21 +1,42 @@
 // Room "space" for Python.
 #include "base/binding.hpp"
 
+#include "space/surface.hpp"
 #include "space/triangulation.hpp"
 
 namespace cmp {
+
+// An array of that shape; a vector has one dimension.
+template <int R, int C>
+struct FromPython<space::Matrix<R, C>> {
+  using Rows = View<const double, C == 1 ? 1 : 2>;
+
+  static space::Matrix<R, C> get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    const Rows rows = FromPython<Rows>::get(object, name, borrowed);
+    if (rows.size() != R || (C > 1 && rows.size(1) != C))
+      throw nb::type_error((name.text() + " has the wrong shape").c_str());
+    return space::Matrix<R, C>::copied(rows);
+  }
+};
 
 // A tuple of views.
 template <>
 struct FromPython<space::PlacedViews> {
   static space::PlacedViews get(nb::handle object, const Name& name, Borrowed& borrowed) {
-    const std::size_t count = nb::len(object);
-    if (count > space::MAX_VIEWS) throw nb::type_error((name.text() + " has more than 8 views").c_str());
+    const std::size_t count = nb::len(object), most = space::MAX_VIEWS;
+    if (count > most)
+      throw nb::value_error(
+          (std::to_string(count) + " views; at most " + std::to_string(most) + " are triangulated").c_str());
     space::PlacedViews out{static_cast<int>(count), {}};
     for (std::size_t k = 0; k < count; ++k)
-      out.views[k] = space::PlacedView::read(Fields(object[k], name, borrowed));
+      out.views[k] = FromPython<space::PlacedView>::get(object[k], name, borrowed);
     return out;
   }
+};
+
+template <>
+struct TypeName<space::PlacedViews> {
+  static std::string get() { return "collections.abc.Sequence[" + TypeName<space::PlacedView>::get() + "]"; }
 };
 
 }  // namespace cmp
@@ -24,69 +45,72 @@ namespace cmp::space {
 
 namespace {
 
-template <int N>
-Vector<N> row_of(View<const double, 2> rows, Index k) {
-  Vector<N> out;
-  for (int i = 0; i < N; ++i) out[i] = rows(k, i);
-  return out;
-}
+struct Places {
+  Array<double, 2> xy;
+  Array<double, 3> by_direction;
 
-template <int R, int C>
-void fill(View<double, 2> to, const Matrix<R, C>& from) {
-  for (int i = 0; i < R; ++i)
-    for (int j = 0; j < C; ++j) to(i, j) = from(i, j);
-}
+  CMP_RECORD("extractor.space.lens.Distorted", xy, by_direction)
+};
 
-std::tuple<Array<double, 2>, Array<double, 3>> distort(const Lens& lens, View<const double, 2> direction) {
+Places distort(const Lens& lens, View<const double, 2> direction) {
   const Index count = direction.size();
-  Array<double, 2> xy({count, 2});
-  Array<double, 3> by_direction({count, 2, 2});
+  Places out{Array<double, 2>({count, 2}), Array<double, 3>({count, 2, 2})};
   for (Index k = 0; k < count; ++k) {
-    const Place place = distorted(lens, row_of<2>(direction, k));
-    xy(k, 0) = place.xy[0];
-    xy(k, 1) = place.xy[1];
-    fill(by_direction[k], place.by_direction);
+    const Place place = distorted(lens, Vector<2>::copied(direction[k]));
+    place.xy.copy_to(out.xy[k]);
+    place.by_direction.copy_to(out.by_direction[k]);
   }
-  return {std::move(xy), std::move(by_direction)};
+  return out;
 }
 
 Array<double, 2> undistort(const Lens& lens, View<const double, 2> xy) {
   Array<double, 2> out({xy.size(), 2});
-  for (Index k = 0; k < xy.size(); ++k) {
-    const Vector<2> direction = undistorted(lens, row_of<2>(xy, k));
-    out(k, 0) = direction[0];
-    out(k, 1) = direction[1];
+  for (Index k = 0; k < xy.size(); ++k) undistorted(lens, Vector<2>::copied(xy[k])).copy_to(out[k]);
+  return out;
+}
+
+struct Pictures {
+  Array<double, 2> xy_px, directions;
+  Array<double, 3> by_point, by_pose;
+
+  CMP_RECORD("extractor.space.camera.Linearisation", xy_px, directions, by_point, by_pose)
+};
+
+Pictures linearise(const PlacedView& view, View<const double, 2> xyz_mm) {
+  const Index count = xyz_mm.size();
+  Pictures out{Array<double, 2>({count, 2}), Array<double, 2>({count, 2}), Array<double, 3>({count, 2, 3}),
+               Array<double, 3>({count, 2, 6})};
+  for (Index k = 0; k < count; ++k) {
+    const Picture found = picture(view, Vector<3>::copied(xyz_mm[k]));
+    found.xy_px.copy_to(out.xy_px[k]);
+    found.direction.copy_to(out.directions[k]);
+    found.by_point.copy_to(out.by_point[k]);
+    found.by_pose.copy_to(out.by_pose[k]);
   }
   return out;
 }
 
-std::tuple<Array<double, 2>, Array<double, 2>, Array<double, 3>, Array<double, 3>> linearise(
-    const PlacedView& view, View<const double, 2> xyz_mm) {
-  const Index count = xyz_mm.size();
-  Array<double, 2> xy({count, 2}), direction({count, 2});
-  Array<double, 3> by_point({count, 2, 3}), by_pose({count, 2, 6});
-  for (Index k = 0; k < count; ++k) {
-    const Picture found = picture(view, row_of<3>(xyz_mm, k));
-    for (int i = 0; i < 2; ++i) {
-      xy(k, i) = found.xy_px[i];
-      direction(k, i) = found.direction[i];
-    }
-    fill(by_point[k], found.by_point);
-    fill(by_pose[k], found.by_pose);
-  }
-  return {std::move(xy), std::move(direction), std::move(by_point), std::move(by_pose)};
+Array<bool, 1> are_ahead(const PlacedView& view, View<const double, 2> xyz_mm) {
+  Array<bool, 1> out({xyz_mm.size()});
+  for (Index k = 0; k < xyz_mm.size(); ++k) out[k] = view.is_ahead(Vector<3>::copied(xyz_mm[k]));
+  return out;
 }
 
-std::tuple<Array<double, 2>, Array<double, 2>> rays(const PlacedView& view, View<const double, 2> xy_px) {
-  Array<double, 2> origin({xy_px.size(), 3}), direction({xy_px.size(), 3});
-  for (Index k = 0; k < xy_px.size(); ++k) {
-    const Ray found = ray(view, row_of<2>(xy_px, k));
-    for (int i = 0; i < 3; ++i) {
-      origin(k, i) = found.origin_mm[i];
-      direction(k, i) = found.direction[i];
-    }
+struct Rays {
+  Array<double, 2> origin_mm, direction;
+
+  CMP_RECORD("extractor.space.medium.Lines", origin_mm, direction)
+};
+
+Rays rays(const PlacedView& view, View<const double, 2> xy_px) {
+  const Index count = xy_px.size();
+  Rays out{Array<double, 2>({count, 3}), Array<double, 2>({count, 3})};
+  for (Index k = 0; k < count; ++k) {
+    const Ray found = ray(view, Vector<2>::copied(xy_px[k]));
+    found.origin_mm.copy_to(out.origin_mm[k]);
+    found.direction.copy_to(out.direction[k]);
   }
-  return {std::move(origin), std::move(direction)};
+  return out;
 }
 
 }  // namespace
@@ -95,8 +119,12 @@ void add_space(nb::module_ module) {
   bind<&distort>(module, "distort", {"lens", "direction"});
   bind<&undistort>(module, "undistort", {"lens", "xy"});
   bind<&linearise>(module, "linearise", {"view", "xyz_mm"});
+  bind<&are_ahead>(module, "are_ahead", {"view", "xyz_mm"});
   bind<&rays>(module, "rays", {"view", "xy_px"});
-  bind<&triangulate>(module, "triangulate", {"views", "xy_px", "cov_px2", "cov_pose", "gate", "limits"});
+  bind<&gradients>(module, "gradients", {"weights", "around", "values"});
+  bind<&points_on_edges>(module, "points_on_edges", {"markers", "edges", "steps_mm", "count"});
+  bind<&triangulate>(module, "triangulate", {"views", "xy_px", "cov_px2", "cov_pose", "gate"});
+  bind<&inverses>(module, "inverses", {"normal"});
 }
 
 }  // namespace cmp::space

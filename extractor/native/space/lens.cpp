@@ -14,7 +14,7 @@ struct Radial {
 Radial fisheye(const Lens& lens, double square) {
   const auto& k = lens.k;
   const double radius = std::sqrt(square), angle = std::atan(radius), t = angle * angle;
-  const bool is_near = square < lens.axis * lens.axis;
+  const bool is_near = square < lens.limits.axis * lens.limits.axis;
   const double share = is_near ? 1.0 - square / 3.0 : angle / radius;
   const double factor = share * (1.0 + t * (k[0] + t * (k[1] + t * (k[2] + t * k[3]))));
   const double slope = 1.0 + t * (3 * k[0] + t * (5 * k[1] + t * (7 * k[2] + t * 9 * k[3])));
@@ -37,7 +37,7 @@ double length(const Vector<2>& v) { return std::hypot(v[0], v[1]); }
 // By which a place at this distance from the axis is multiplied for a first direction.
 double start_factor(const Lens& lens, double radius) {
   if (radius == 0.0) return 0.0;
-  const double wanted = lens.is_fisheye ? std::tan(std::min(radius, lens.start_rad)) : radius;
+  const double wanted = lens.is_fisheye ? std::tan(std::min(radius, lens.limits.start_rad)) : radius;
   return std::min(wanted, 0.9 * lens.fold_radius) / radius;
 }
 
@@ -65,14 +65,14 @@ Vector<2> undistorted(const Lens& lens, const Vector<2>& place) {
   Vector<2> direction = start_factor(lens, radius) * place;
   Place now = distorted(lens, direction);
   double error = length(place - now.xy);
-  for (std::int64_t k = 0; k < lens.max_iterations && error > lens.converged * limit; ++k) {
+  for (std::int64_t k = 0; k < lens.limits.max_iterations && error > lens.limits.converged * limit; ++k) {
     const Vector<2> residual = place - now.xy;
     const auto& d = now.by_direction;
     const double determinant = d(0, 0) * d(1, 1) - d(0, 1) * d(1, 0);
     Vector<2> step{{(d(1, 1) * residual[0] - d(0, 1) * residual[1]) / determinant,
                     (d(0, 0) * residual[1] - d(1, 0) * residual[0]) / determinant}};
     bool is_moved = false;
-    for (std::int64_t half = 0; half < lens.max_halvings && step.is_finite() && !is_moved; ++half) {
+    for (std::int64_t half = 0; half < lens.limits.max_halvings && step.is_finite() && !is_moved; ++half) {
       const Vector<2> tried = direction + step;
       const Place there = distorted(lens, tried);
       is_moved = length(place - there.xy) < error && length(tried) < lens.fold_radius;
@@ -86,7 +86,7 @@ Vector<2> undistorted(const Lens& lens, const Vector<2>& place) {
     if (!is_moved) break;
   }
   const auto& d = now.by_direction;
-  const bool is_valid = error < lens.accepted * limit && length(direction) < lens.fold_radius &&
+  const bool is_valid = error < lens.limits.accepted * limit && length(direction) < lens.fold_radius &&
                         d(0, 0) * d(1, 1) - d(0, 1) * d(1, 0) > 0.0;
   return is_valid ? direction : Vector<2>::filled(NOT_A_NUMBER);
 }

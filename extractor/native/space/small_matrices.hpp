@@ -32,11 +32,21 @@ struct Matrix {
     for (int k = 0; k < std::min(R, C); ++k) out(k, k) = 1.0;
     return out;
   }
-  static Matrix copied(View<const double, 2> from) {
+  static Matrix copied(View<const double, C == 1 ? 1 : 2> from) {
     Matrix out;
-    for (int i = 0; i < R; ++i)
-      for (int j = 0; j < C; ++j) out(i, j) = from(i, j);
+    if constexpr (C == 1) {
+      std::copy_n(from.begin(), R, out.values.begin());
+    } else {
+      for (int i = 0; i < R; ++i) std::copy_n(from[i].begin(), C, out.values.begin() + i * C);
+    }
     return out;
+  }
+  void copy_to(View<double, C == 1 ? 1 : 2> to) const {
+    if constexpr (C == 1) {
+      std::copy_n(values.begin(), R, to.begin());
+    } else {
+      for (int i = 0; i < R; ++i) std::copy_n(values.begin() + i * C, C, to[i].begin());
+    }
   }
   bool is_finite() const {
     return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
@@ -118,12 +128,13 @@ inline std::array<double, 3> eigenvalues(Matrix<3, 3> m) {
 }
 
 inline double determinant(const Matrix<3, 3>& m) {
-  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) - m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
+  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
+         m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
          m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
 }
 
-// Whether the least eigenvalue of a symmetric matrix with none below 0 is above a limit. The others multiply to
-// at most the square of half the trace; only where that does not decide, the eigenvalues are computed.
+// Whether the least eigenvalue of a symmetric matrix with none below 0 is above a limit. The others multiply
+// to at most the square of half the trace; only where that does not decide, the eigenvalues are computed.
 inline bool is_regular(const Matrix<3, 3>& m, double min_eigenvalue) {
   constexpr double MARGIN = 10.0;
   const double half = 0.5 * (m(0, 0) + m(1, 1) + m(2, 2));
@@ -134,7 +145,8 @@ inline bool is_regular(const Matrix<3, 3>& m, double min_eigenvalue) {
 inline Matrix<3, 3> scaled_inverse(const Matrix<3, 3>& normal, double min_eigenvalue) {
   Matrix<3, 3> singular;
   for (int k = 0; k < 3; ++k) singular(k, k) = INFINITE;
-  if (!normal.is_finite() || !(normal(0, 0) > 0.0 && normal(1, 1) > 0.0 && normal(2, 2) > 0.0)) return singular;
+  if (!normal.is_finite() || !(normal(0, 0) > 0.0 && normal(1, 1) > 0.0 && normal(2, 2) > 0.0))
+    return singular;
   const double root[3] = {std::sqrt(normal(0, 0)), std::sqrt(normal(1, 1)), std::sqrt(normal(2, 2))};
   Matrix<3, 3> m;
   for (int i = 0; i < 3; ++i)

@@ -51,8 +51,8 @@ void add_pixel(Pixels& pixels, const PlacedView& view, int number, View<const do
   const auto c = Matrix<2, 2>::copied(cov);
   const double determinant = c(0, 0) * c(1, 1) - c(0, 1) * c(1, 0);
   if (!place.is_finite() || !c.is_finite() || !(c(0, 0) > 0.0) || !(determinant > 0.0)) return;
-  const Matrix<2, 2> weight{{c(1, 1) / determinant, -c(0, 1) / determinant, -c(1, 0) / determinant,
-                             c(0, 0) / determinant}};
+  const Matrix<2, 2> weight{
+      {c(1, 1) / determinant, -c(0, 1) / determinant, -c(1, 0) / determinant, c(0, 0) / determinant}};
   pixels.seen[static_cast<std::size_t>(pixels.count++)] = {&view, number, place, weight};
 }
 
@@ -67,8 +67,7 @@ std::uint8_t find_start(const Pixels& pixels, const TriangulationLimits& limits,
   for (std::size_t k = 0; k < static_cast<std::size_t>(pixels.count); ++k) {
     rays[k] = ray(*pixels.seen[k].view, pixels.seen[k].xy_px);
     if (!rays[k].direction.is_finite()) return NO_RAY;
-    const Matrix<3, 3> across =
-        Matrix<3, 3>::unit() - rays[k].direction * rays[k].direction.transposed();
+    const Matrix<3, 3> across = Matrix<3, 3>::unit() - rays[k].direction * rays[k].direction.transposed();
     normal += across;
     right += across * rays[k].origin_mm;
   }
@@ -195,7 +194,7 @@ Points triangulate(const PlacedViews& views, View<const double, 3> xy_px, View<c
   const Index count = xy_px.size(1), poses = 6 * views.count;
   Array<double, 2> xyz({count, 3}, NOT_A_NUMBER);
   Array<double, 3> cov({count, 3, 3}, NOT_A_NUMBER), by_pose({count, 3, poses}, NOT_A_NUMBER);
-  Array<double, 1> misfit({count}, NOT_A_NUMBER);
+  Array<double, 1> misfit({count}, NOT_A_NUMBER), inflation({count}, 1.0);
   Array<std::uint8_t, 1> reason({count}, FOUND);
   Solution found;
   for (Index p = 0; p < count; ++p) {
@@ -203,14 +202,13 @@ Points triangulate(const PlacedViews& views, View<const double, 3> xy_px, View<c
     for (int v = 0; v < views.count; ++v)
       add_pixel(pixels, views.views[static_cast<std::size_t>(v)], v, xy_px[v][p], cov_px2[v][p]);
     Vector<3> start;
-    reason[p] = pixels.count == 0   ? UNSEEN
-                : pixels.count == 1 ? ONE_VIEW
-                                    : find_start(pixels, limits, start);
+    reason[p] = pixels.count == 0 ? UNSEEN : pixels.count == 1 ? ONE_VIEW : find_start(pixels, limits, start);
     if (reason[p] != FOUND) continue;
     solve(pixels, start, limits, found);
     fill_by_pose(pixels, found, by_pose[p]);
     misfit[p] = std::sqrt(found.residuals.chi_square / freedom(pixels, found, by_pose[p], cov_pose));
-    if (misfit[p] > limits.inflation_sigmas) found.cov_mm2 *= misfit[p] * misfit[p];
+    if (misfit[p] > limits.inflation_sigmas) inflation[p] = misfit[p] * misfit[p];
+    found.cov_mm2 *= inflation[p];
     double residual = 0.0;
     for (std::size_t k = 0; k < static_cast<std::size_t>(pixels.count); ++k)
       residual += dot(found.residuals.px[k], found.residuals.px[k]);
@@ -219,12 +217,18 @@ Points triangulate(const PlacedViews& views, View<const double, 3> xy_px, View<c
       by_pose[p].fill(NOT_A_NUMBER);
       continue;
     }
-    for (int i = 0; i < 3; ++i) {
-      xyz(p, i) = found.xyz_mm[i];
-      for (int j = 0; j < 3; ++j) cov(p, i, j) = found.cov_mm2(i, j);
-    }
+    found.xyz_mm.copy_to(xyz[p]);
+    found.cov_mm2.copy_to(cov[p]);
   }
-  return {std::move(xyz), std::move(cov), std::move(by_pose), std::move(misfit), std::move(reason)};
+  return {std::move(xyz),    std::move(cov),       std::move(by_pose),
+          std::move(misfit), std::move(inflation), std::move(reason)};
+}
+
+Array<double, 3> inverses(View<const double, 3> normal, const TriangulationLimits& limits) {
+  Array<double, 3> out({normal.size(), 3, 3});
+  for (Index k = 0; k < normal.size(); ++k)
+    scaled_inverse(Matrix<3, 3>::copied(normal[k]), limits.min_eigenvalue).copy_to(out[k]);
+  return out;
 }
 
 }  // namespace cmp::space

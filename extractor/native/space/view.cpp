@@ -17,7 +17,8 @@ struct Depths {
 };
 
 Depths apparent_depth(const Window& window, double gel_mm, double tangent) {
-  const double in_window = sideways(tangent, window.window_index), in_gel = sideways(tangent, window.gel_index);
+  const double in_window = sideways(tangent, window.window_index),
+               in_gel = sideways(tangent, window.gel_index);
   const double by_window = window.window_index * window.window_index * in_window * in_window * in_window;
   const double by_gel = window.gel_index * window.gel_index * in_gel * in_gel * in_gel;
   return {window.distance_mm + window.window_mm * in_window + gel_mm * in_gel,
@@ -26,11 +27,11 @@ Depths apparent_depth(const Window& window, double gel_mm, double tangent) {
 
 double solved_tangent(const Window& window, double gel_mm, double radius_mm) {
   double tangent = radius_mm / (window.distance_mm + window.window_mm + gel_mm);
-  for (std::int64_t k = 0; k < window.max_iterations; ++k) {
+  for (std::int64_t k = 0; k < window.limits.max_iterations; ++k) {
     const auto [depth, slope] = apparent_depth(window, gel_mm, tangent);
     const double step = (radius_mm - tangent * depth) / slope;
     tangent += step;
-    if (!(std::abs(step) > window.converged * (1.0 + tangent))) break;
+    if (!(std::abs(step) > window.limits.converged * (1.0 + tangent))) break;
   }
   return tangent;
 }
@@ -71,14 +72,14 @@ Sight refracted(const Window& window, const Vector<3>& rotated, const Vector<3>&
   const Vector<3> by_distance = ((in_gel - tangent) / slope) * outward;
   return {n + tangent * outward, by_point,
           by_point * point_by_pose(rotated) + by_normal * window.normal_by_pose +
-              by_distance * window.distance_by_pose};
+              by_distance * window.distance_by_pose.transposed()};
 }
 
 }  // namespace
 
 double Window::gel_depth_mm(const Vector<3>& camera) const {
   const double depth = dot(camera, normal) - distance_mm - window_mm;
-  return depth >= -touching_mm && distance_mm > 0.0 ? std::max(depth, 0.0) : NOT_A_NUMBER;
+  return depth >= -limits.touching_mm && distance_mm > 0.0 ? std::max(depth, 0.0) : NOT_A_NUMBER;
 }
 
 bool PlacedView::is_ahead(const Vector<3>& xyz_mm) const {

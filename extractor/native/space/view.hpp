@@ -6,6 +6,13 @@
 
 namespace cmp::space {
 
+// Limits of Newton's method for the picture of a point behind a window.
+struct WindowLimits {
+  std::int64_t max_iterations = 50;  // about 5 are needed. Chosen.
+  double converged = 1e-9;           // last step, of 1 + q: the error is about its square. Chosen.
+  double touching_mm = 1e-9;         // by which a pattern on the window may lie within it. Derived: rounding.
+};
+
 // Window and gel before a camera, in its frame; see PlacedWindow.
 struct Window {
   bool is_there;
@@ -13,28 +20,11 @@ struct Window {
   Vector<3> normal;
   double distance_mm;
   Matrix<3, 6> normal_by_pose;
-  Matrix<1, 6> distance_by_pose;
-  std::int64_t max_iterations;
-  double converged, touching_mm;
+  Vector<6> distance_by_pose;
+  WindowLimits limits{};
 
-  template <class F>
-  static Window read(const F& f) {
-    const View<const double, 1> normal = f["normal"], by_pose = f["distance_by_pose"];
-    Window out{f["is_there"],
-               f["gel_index"],
-               f["window_mm"],
-               f["window_index"],
-               {},
-               f["distance_mm"],
-               Matrix<3, 6>::copied(f["normal_by_pose"]),
-               {},
-               f["max_iterations"],
-               f["converged"],
-               f["touching_mm"]};
-    for (int k = 0; k < 3; ++k) out.normal[k] = normal[k];
-    for (int k = 0; k < 6; ++k) out.distance_by_pose[k] = by_pose[k];
-    return out;
-  }
+  CMP_RECORD("extractor.space.medium.PlacedWindow", is_there, gel_index, window_mm, window_index, normal,
+             distance_mm, normal_by_pose, distance_by_pose)
 
   // The gel between the window and a point; NaN where the camera does not see the point.
   double gel_depth_mm(const Vector<3>& camera) const;
@@ -47,13 +37,7 @@ struct PlacedView {
   Vector<3> shift_mm;
   Window window;
 
-  template <class F>
-  static PlacedView read(const F& f) {
-    const std::array<double, 2> focal = f["focal_px"], centre = f["centre_px"];
-    const View<const double, 1> shift = f["shift_mm"];
-    return {{focal}, {centre}, f["lens"], Matrix<3, 3>::copied(f["rotation"]), {{shift[0], shift[1], shift[2]}},
-            f["window"]};
-  }
+  CMP_RECORD("extractor.space.camera.PlacedViewTable", focal_px, centre_px, lens, rotation, shift_mm, window)
 
   bool is_ahead(const Vector<3>& xyz_mm) const;
 };

@@ -156,7 +156,7 @@ def test_values_show_themselves(design: cmpdesign.Design, image: np.ndarray) -> 
     nothing = Extractor(design.layout).extract(np.full((100, 100, 3), 90, np.uint8))
     assert "no_color" in repr(nothing) and "light that shows all inks" in nothing._repr_html_()
     rendered = cmpdesign.render(design.layout, pitch_px=30)
-    for value in (rendered, rendered.truth, Tracker(design.layout).track(image)):
+    for value in (rendered.found, rendered.truth, Tracker(design.layout).track(image)):
         assert len(repr(value)) < 120 and type(value).__name__ in repr(value) and "37" in repr(value)
     assert rendered._repr_png_().startswith(b"\x89PNG")
 
@@ -168,7 +168,7 @@ def test_a_report_is_what_the_command_writes(
     cv2.imwrite(str(tmp_path / "seen.png"), image)
     given = (tmp_path / "layout.json", tmp_path / "seen.png")
     assert run("verify", *given, "--report", tmp_path / "a.zip").exit_code == 0
-    assert cmpdesign.verify(*given, report=tmp_path / "b.zip").verified
+    assert cmpdesign.verify(*given, tmp_path / "b", report=tmp_path / "b.zip").verified
     assert cmpdesign.verify(design.layout, image, report=tmp_path / "c.zip").verified
     command, call, array = (zipfile.ZipFile(tmp_path / f"{name}.zip") for name in "abc")
     assert command.namelist() == call.namelist() and len(array.namelist()) == len(call.namelist())
@@ -204,7 +204,9 @@ def test_render_draws_what_the_command_draws(design: cmpdesign.Design, tmp_path:
         assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.files)
     with pytest.raises(TypeError, match="pitch is no option; there are pitch_px"):
         cmpdesign.render(design.layout, pitch=25)  # type: ignore[call-arg]
-    with pytest.raises(cmpdesign.CmpDesignError, match="pitch_px cannot be given with a scene"):
+    with pytest.raises(
+        cmpdesign.CmpDesignError, match=r"pitch_px cannot be given with scene; write \[camera\] pitch_px"
+    ):
         cmpdesign.render(design.layout, "pressed-ball", pitch_px=25)
     with pytest.raises(cmpdesign.CmpDesignError, match="ending"):
         drawn.save(tmp_path / "c.gif", truth=tmp_path / "c.npz")

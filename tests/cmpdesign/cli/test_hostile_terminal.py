@@ -14,10 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cmpdesign.cli.terminal import MAX_LINE_LETTERS, error_on_one_line
 from cmpdesign.design.templates import templates_folder
 from cmpdesign.errors import CmpDesignError
-from cmpdesign.inputs.texts import visible
+from cmpdesign.inputs.texts import MAX_LINE_LETTERS, one_line, visible
 from tests.support.command import run
 
 ESCAPE = "\x1b]0;owned\x07\x1b[2J"
@@ -43,12 +42,12 @@ def clean(*arguments: object, code: int | None = None) -> str:
 def test_any_text_becomes_visible(text: str) -> None:
     shown = visible(text)
     assert shown.isprintable() and (shown == text) == text.isprintable()
-    line = error_on_one_line(CmpDesignError(text * 40))
+    line = one_line(CmpDesignError(text * 40))
     assert line.isprintable() and len(line) <= MAX_LINE_LETTERS
 
 
 def test_a_long_line_keeps_its_remedy() -> None:
-    line = error_on_one_line(CmpDesignError(f"out.toml: {'x' * 10_000} is too long; make it shorter"))
+    line = one_line(CmpDesignError(f"out.toml: {'x' * 10_000} is too long; make it shorter"))
     assert line.startswith("out.toml: xxx") and line.endswith("; make it shorter")
     assert len(line) == MAX_LINE_LETTERS
 

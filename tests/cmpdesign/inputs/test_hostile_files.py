@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from cmpdesign.cli.terminal import MAX_LINE_LETTERS, error_on_one_line
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.texts import MAX_LINE_LETTERS, one_line
 from extractor import ExtractorError
 from tests.support.hostile.input_files import DATA, DOCUMENTS, EVERY, LEFT, InputFile, as_text, toml
 
@@ -56,7 +56,7 @@ def answer(kind: InputFile, path: Path) -> str | None:
         with at_once():
             kind.read(path)
     except EXPECTED as error:
-        line = error_on_one_line(error)
+        line = one_line(error)
         assert line.isprintable() and 0 < len(line) <= MAX_LINE_LETTERS
         return line
     return None

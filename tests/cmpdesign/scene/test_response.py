@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from cmpdesign.patterns.colors import RED
 from cmpdesign.scene import (
@@ -79,9 +79,7 @@ def test_an_edge_is_encoded_after_the_blur(blur_px, response, light, value) -> N
     row, x, right = one_edge(blur_px, Sensor(bits=16, response=response))
     places = np.arange(50, 72)
     # The mean of the normal distribution over each pixel.
-    share = np.array(
-        [quad(lambda u: norm.cdf(u, scale=blur_px), p - x - 0.5, p - x + 0.5)[0] for p in places]
-    )
+    share = np.array([quad(lambda u: ndtr(u / blur_px), p - x - 0.5, p - x + 0.5)[0] for p in places])
     share = (share if right else 1 - share)[:, None]
     red, black = (np.array(INKS[name][::-1]) / 255 for name in ("red", "black"))
     expected = 255 * value(light(black) + share * (light(red) - light(black)))

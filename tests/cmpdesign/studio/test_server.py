@@ -32,7 +32,9 @@ from cmpdesign.studio.app import PAGE, make_app
 from cmpdesign.studio.builds import MAX_RUNNING, Builds
 from cmpdesign.studio.guard import Door
 from cmpdesign.studio.live import LiveFeed
+from cmpdesign.studio.pictures import RESIDUAL_SIGMAS, residual_picture
 from cmpdesign.studio.serving import serve
+from extractor import Extractor
 from tests.support.laser_tools import coupon_photo
 from tests.support.tracking.live_messages import unpacked
 
@@ -203,11 +205,12 @@ def test_builds_are_few_and_private_and_leave_nothing() -> None:
 def test_a_picture_is_read_as_the_call_reads_it(page: TestClient) -> None:
     design = cmpdesign.Design(**FIELDS)
     image = cmpdesign.render(design.layout, pitch_px=30, rotation_deg=20, noise=1).image
-    expected = cmpdesign.verify(design.layout, image)
+    expected = cmpdesign.verify(design.layout, image).found
     query = {"fields": '{"pattern": "honeycomb", "layers": 3, "pitch_mm": "60mil"}', "name": "seen.png"}
     found = page.post("/api/readings", params=query, content=to_png(image)).json()
     assert found["verified"] and found["measured"] == expected.measured == len(found["ids"])
     assert found["xy"] == expected.markers.xy_px[found["ids"]].round(3).tolist()
+    assert found["stages"][-1] == "residual"
     for stage in ("picture", *found["stages"]):
         assert page.get(f"/api/readings/{found['key']}/{stage}.jpg").content.startswith(b"\xff\xd8")
     report = page.get(f"/api/readings/{found['key']}/report.zip").content
@@ -218,6 +221,26 @@ def test_a_picture_is_read_as_the_call_reads_it(page: TestClient) -> None:
     bomb[16:24] = (9_000).to_bytes(4, "big") * 2
     bomb[29:33] = zlib.crc32(bomb[12:29]).to_bytes(4, "big")
     assert "megapixels; the limit is 60" in refused(page, "/api/readings", params=query, content=bytes(bomb))
+
+
+def test_residuals_are_noise_but_for_what_is_not_the_pattern() -> None:
+    layout = cmpdesign.Design(**FIELDS).layout
+    seen = cmpdesign.render(layout, pitch_px=40, rotation_deg=7, noise=2, size=(400, 400), seed=1)
+    markers = Extractor(layout.reference()).extract(seen.image)
+    x, y = np.rint(seen.truth.marker_xy_px[:2].mean(axis=0)).astype(int)
+    dirty = seen.image.copy()
+    cv2.circle(dirty, (int(x), int(y)), 6, (130, 120, 110), -1)
+    of_noise, of_dirt = (
+        residual_picture(image, layout.reference(), markers).astype(float) - 128
+        for image in (seen.image, dirty)
+    )
+    per_sigma = 127.5 / RESIDUAL_SIGMAS
+    middle = np.s_[100:300, 100:300]
+    assert 0.8 < of_noise[middle].std() / per_sigma < 1.3
+    disc = np.s_[y - 3 : y + 4, x - 3 : x + 4]
+    assert np.abs(of_dirt[disc]).min(axis=(0, 1)).max() > 5 * per_sigma
+    of_dirt[y - 8 : y + 9, x - 8 : x + 9] = 0
+    assert np.abs(of_dirt - of_noise)[np.abs(of_dirt) > 0].max() < 2 * per_sigma
 
 
 # -- live

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cmpdesign import layout_to_json
-from cmpdesign.scene import Optics, Press, Scene, Sensor, composed, render
+from cmpdesign.scene import Optics, Press, Rendered, Scene, Sensor, composed, render
 from cmpdesign.scene.bounds.exact_bound import exact_bound
 from cmpdesign.scene.standard import standard_layout, standard_scene
 from extractor import Extractor, Markers, parse_layout
@@ -22,6 +22,7 @@ from tests.support.pictures import srgb_light
 
 LAYERS, SIZE, NOISE, SEEDS = 5, (300, 260), 2.0, 4
 LAYOUT = standard_layout("honeycomb", LAYERS)
+REFERENCE = parse_layout(layout_to_json(LAYOUT))
 INNER = LAYOUT.marker_layer < LAYERS
 SHARE = np.linspace(0, 1, 256)
 # a camera's curve: sRGB with more contrast in the middle of the values
@@ -30,7 +31,7 @@ RESPONSES: dict[str, Any] = {"srgb": "srgb", "linear": "linear", "1.8": 1.8, "2.
 
 
 def extractor(preset: str = "balanced", response: Any = None) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(LAYOUT)), preset, response)  # type: ignore[arg-type]
+    return Extractor(REFERENCE, preset, response)  # type: ignore[arg-type]
 
 
 def scene(response: str = "srgb", bits: int = 8, bent: bool = False) -> Scene:
@@ -40,14 +41,25 @@ def scene(response: str = "srgb", bits: int = 8, bent: bool = False) -> Scene:
 
 
 @cache
+def seen(response: str, bent: bool = False, seed: int = 0, bits: int = 8) -> Rendered:
+    return render(replace(scene(response, bits, bent), seed=seed), size=SIZE)
+
+
+@cache
+def bound_px2(response: str, bent: bool) -> float:
+    """The mean of the markers with all their gridlines, per axis."""
+    bound = exact_bound(scene(response, bent=bent), size=SIZE)[INNER]
+    return float(np.einsum("mii->m", bound).mean() / 2)
+
+
+@cache
 def ratio(preset: str, response: str, bent: bool = False) -> float:
     """RMS error over the exact bound of the encoded picture, of the markers with all their gridlines."""
-    shown, by, errors = scene(response, bent=bent), extractor(preset, RESPONSES[response]), []
+    by, errors = extractor(preset, RESPONSES[response]), []
     for seed in range(SEEDS):
-        seen = render(replace(shown, seed=seed), size=SIZE)
-        errors.append((by.extract(seen.image).xy_px - seen.truth.marker_xy_px)[INNER])
-    bound = np.einsum("mii->m", exact_bound(shown, size=SIZE)[INNER]).mean() / 2
-    return float(np.sqrt(np.mean(np.square(errors)) / bound))
+        shown = seen(response, bent, seed)
+        errors.append((by.extract(shown.image).xy_px - shown.truth.marker_xy_px)[INNER])
+    return float(np.sqrt(np.mean(np.square(errors)) / bound_px2(response, bent)))
 
 
 @pytest.mark.parametrize("response", ["1.8", "2.6", "S-curve"])
@@ -64,11 +76,11 @@ def test_linear_pictures_are_read_as_before_there_were_responses(bent: bool) -> 
 
 def mean_outward_px(preset: str, shown: str, read_as: str) -> float:
     """The mean outward error of the markers of the rim."""
-    shifts = []
+    shifts, by = [], extractor(preset, RESPONSES[read_as])
     for seed in range(SEEDS):
-        seen = render(replace(scene(shown), seed=seed), size=SIZE)
-        markers = extractor(preset, RESPONSES[read_as]).extract(seen.image)
-        true = seen.truth.marker_xy_px
+        picture = seen(shown, seed=seed)
+        markers = by.extract(picture.image)
+        true = picture.truth.marker_xy_px
         outward = true - true.mean(axis=0)
         outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
         shifts.append(((markers.xy_px - true) * outward).sum(axis=1)[~INNER])
@@ -89,8 +101,8 @@ def assert_same(found: Markers, expected: Markers) -> None:
 
 
 def test_eight_bits_are_srgb_and_sixteen_linear_unless_told_otherwise() -> None:
-    linear = render(scene("linear", bits=16), size=SIZE).image
-    encoded = render(scene("srgb"), size=SIZE).image
+    linear = seen("linear", bits=16).image
+    encoded = seen("srgb").image
     by = extractor()
     assert_same(by.extract(linear), extractor(response="linear").extract(linear))
     assert_same(by.extract(encoded), extractor(response="srgb").extract(encoded))
@@ -99,19 +111,23 @@ def test_eight_bits_are_srgb_and_sixteen_linear_unless_told_otherwise() -> None:
 
 @pytest.mark.parametrize("response", RESPONSES)
 def test_a_stated_response_holds_for_both_depths(response: str) -> None:
-    eight: NDArray[Any] = render(scene(response), size=SIZE).image
+    eight: NDArray[Any] = seen(response).image
     sixteen, by = eight.astype(np.uint16) * 257, extractor(response=RESPONSES[response])
     assert_same(by.extract(sixteen), by.extract(eight))
-    true = render(scene(response), size=SIZE).truth.marker_xy_px
+    true = seen(response).truth.marker_xy_px
     assert np.sqrt(np.mean((by.extract(sixteen).xy_px - true)[INNER] ** 2)) < 0.02
 
 
 @pytest.mark.parametrize("duplicate", [lambda by: pickle.loads(pickle.dumps(by)), copy.deepcopy, copy.copy])
 @pytest.mark.parametrize("response", [None, "linear", 1.8, S_CURVE, np.array(S_CURVE)])
 def test_a_copy_keeps_the_response(response: Any, duplicate: Callable[[Extractor], Extractor]) -> None:
-    image = render(scene("S-curve"), size=SIZE).image
+    image = seen("S-curve").image
     by = extractor(response=response)
-    assert_same(duplicate(by).extract(image), by.extract(image))
-    assert (
-        duplicate(by).extract(image).xy_px.tobytes() != extractor(response=2.6).extract(image).xy_px.tobytes()
-    )
+    found = duplicate(by).extract(image)
+    assert_same(found, by.extract(image))
+    assert found.xy_px.tobytes() != read_otherwise().xy_px.tobytes()
+
+
+@cache
+def read_otherwise() -> Markers:
+    return extractor(response=2.6).extract(seen("S-curve").image)

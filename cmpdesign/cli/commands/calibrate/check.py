@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cmpdesign.api.calibration import calibrate_check
 from cmpdesign.cli.derived import derived
-from cmpdesign.cli.terminal import print_step, print_warning, say
+from cmpdesign.cli.terminal import print_step, print_warning, say, say_columns
 
 if TYPE_CHECKING:
     from cmpdesign.documents.calibration import CalibrateCheckDocument
@@ -27,8 +27,6 @@ def check(done: CalibrateCheckDocument) -> int:
 
 
 def _print_figures(found: CalibrateCheckDocument) -> None:
-    from rich.table import Table
-
     for view, rms_px in found.rms_px.items():
         stated_px = found.stated_px.get(view)
         then = "" if stated_px is None else f", {stated_px:.4f} px at the calibration"
@@ -41,12 +39,7 @@ def _print_figures(found: CalibrateCheckDocument) -> None:
     if found.holds:
         say("the calibration holds")
         return
-    table = Table(box=None, pad_edge=False)
-    table.add_column("cause")
-    table.add_column("leaves", justify="right")
-    for one in found.causes:
-        table.add_row(one.cause, f"{one.left:.2f}")
-    say(table)
+    say_columns(("cause", ">leaves"), [(one.cause, f"{one.left:.2f}") for one in found.causes])
     print_warning(f"the calibration does not hold; likely cause: {'; or '.join(found.found.likely)}")
     for one in found.causes:
         if one.likely:

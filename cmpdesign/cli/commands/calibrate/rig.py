@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cmpdesign.api.calibration import calibrate_rig
 from cmpdesign.cli.derived import derived
-from cmpdesign.cli.terminal import print_step, print_warning, printable_path, say
+from cmpdesign.cli.terminal import print_step, print_warning, printable_path, say, say_columns
 
 if TYPE_CHECKING:
     from cmpdesign.documents.calibration import CalibrateRigDocument
@@ -28,15 +28,11 @@ def rig(done: CalibrateRigDocument) -> None:
 
 
 def _print_figures(found: CalibrateRigDocument) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    for heading in ("", "value", "+- before", "+- after"):
-        table.add_column(heading, justify="left" if not heading else "right")
+    rows = []
     for name, value in found.parameters.items():
         shown = f"{value:.5g}" if abs(value) < 10 else f"{value:.3f}"
-        table.add_row(name, shown, f"{found.stated[name]:.2g}", f"{found.deviations[name]:.2g}")
-    say(table)
+        rows.append((name, shown, f"{found.stated[name]:.2g}", f"{found.deviations[name]:.2g}"))
+    say_columns(("", ">value", ">+- before", ">+- after"), rows)
     residuals = ", ".join(f"{name} {rms:.4f} px" for name, rms in found.rms_px.items())
     say(f"residuals at rest: {residuals} per axis, {found.scale:.2f} stated deviations")
     for pair in found.mirrors:

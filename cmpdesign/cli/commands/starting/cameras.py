@@ -6,28 +6,24 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from cmpdesign.cli.terminal import finish, say, say_text
+from cmpdesign.api import sequences
+from cmpdesign.cli.derived import derived
+from cmpdesign.cli.terminal import say, say_text
 from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.runs import CameraFormatPart, ListedCameraPart
+    from cmpdesign.documents.runs import CameraFormatPart, CamerasDocument, ListedCameraPart
 
 EXAMPLES = ("cmpdesign cameras", "cmpdesign cameras --json")
 
 
-def cameras() -> None:
-    """List the cameras: formats, sizes and rates, and the ranges of exposure, gain, white balance and focus.
-
-    track takes a camera by its number, its file, its serial number or a part of its name.
-    """
-    from cmpdesign.api import sequences
-
-    found = sequences.cameras()
+@derived(sequences.cameras, "listing")
+def cameras(found: CamerasDocument) -> None:
+    """track takes a camera by its number, its file, its serial number or a part of its name."""
     if not found.cameras:
         say("no camera is connected")
     for camera in found.cameras:
         say_text("\n".join(map(visible, _lines(camera))) + "\n")
-    finish(lambda: found)
 
 
 def _size_text(each: CameraFormatPart) -> str:

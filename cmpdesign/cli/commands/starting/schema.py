@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated
 
 import typer
 
+from cmpdesign.api import making
 from cmpdesign.cli.terminal import print_document
 
 EXAMPLES = ("cmpdesign schema", "cmpdesign schema evaluate designs")
@@ -24,11 +26,5 @@ def schema(
 
     The schema of a design's TOML file, for editors, or of the document that COMMAND prints with --json.
     """
-    if not command:
-        from cmpdesign.design.design import design_schema_text
-
-        print_document(design_schema_text())
-        return
-    from cmpdesign.documents.registry import document_schema_text
-
-    print_document(document_schema_text(" ".join(command)))
+    found = making.schema(" ".join(command or ()))
+    print_document(json.dumps(found, indent=2, ensure_ascii=False) + "\n")

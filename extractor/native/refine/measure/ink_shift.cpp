@@ -182,12 +182,29 @@ void update_with_offsets(View<double, 2> lines, View<const double, 1> offset) {
   }
 }
 
-Array<double, 2> crossing_shifts(View<const double, 2> shift, View<const double, 2> lines,
-                                 View<const double, 3> maps, const layout::Topology& topology,
-                                 const InkShiftLimits& limits) {
+GridlinesBetween gridlines_between(View<const double, 2> shift, View<const double, 2> lines,
+                                   View<const double, 3> maps, const layout::Topology& topology) {
+  GridlinesBetween out{ink_offsets(shift, lines, maps, topology), Array<double, 1>({lines.size()}, 0.0)};
+  double largest = 0.0;
+  for (Index e = 0; e < lines.size(); ++e) {
+    out.offset[e] *= 0.5;
+    out.variance[e] = out.offset[e] * out.offset[e];
+    largest = std::max(largest, out.variance[e]);
+  }
+  // beside the white cell, the seen gridline is of two cells
+  for (Index e = 0; e < lines.size(); ++e) {
+    if (topology.edge_cells(e, 0) >= 0 && topology.edge_cells(e, 1) >= 0) out.variance[e] = largest;
+  }
+  return out;
+}
+
+void update_between_places(View<double, 2> xy, View<double, 3> cov, View<const double, 2> shift,
+                           View<const double, 2> lines, View<const double, 3> maps,
+                           const layout::Topology& topology, const InkShiftLimits& limits) {
+  const auto all = shift.flat();
+  if (std::all_of(all.begin(), all.end(), [](double value) { return value == 0.0; })) return;
   const Array<double, 1> offset = ink_offsets(shift, lines, maps, topology);
-  Array<double, 2> out({topology.spokes.size(), 2}, 0.0);
-  for (Index m = 0; m < topology.spokes.size(); ++m) {
+  for (Index m = 0; m < xy.size(); ++m) {
     VectorFit fit;
     for (Index k = 0; k < topology.spokes.size(1); ++k) {
       const Index e = topology.spokes(m, k);
@@ -196,10 +213,12 @@ Array<double, 2> crossing_shifts(View<const double, 2> shift, View<const double,
     }
     if (!fit.is_determined(limits.min_determinant)) continue;
     const auto [x, y] = fit.solution();
-    out(m, 0) = x;
-    out(m, 1) = y;
+    xy(m, 0) += 0.5 * x;
+    xy(m, 1) += 0.5 * y;
+    const double variance = 0.125 * (x * x + y * y);
+    cov(m, 0, 0) += variance;
+    cov(m, 1, 1) += variance;
   }
-  return out;
 }
 
 }  // namespace cmp::refine

@@ -3,8 +3,10 @@
 // A gridline is a side of one colored cell and lies off with that cell. The three sides of a cell tell where
 // the cell lies. Errors of the markers move cells of all colors alike, so the median over the cells of one
 // color, less the mean of the three colors, is the shift of that ink. The pattern is drawn with the shifts,
-// and solved without: the markers are the places on which the three colors agree. A marker of a pad with
-// shifted inks is where the sides of its cells cross, by least squares; crossing_shifts leads there.
+// and solved without: the markers are the places on which the three colors agree. Such a marker has a
+// second place, where its gridlines cross as they are seen, by least squares: each ink has two of the six. A
+// point on a gridline has two places, too, on the gridline that joins the markers and on the seen one. All
+// are stated in the middle between both, with half of the distance as a deviation that covers both.
 #pragma once
 
 #include "base/array.hpp"
@@ -44,13 +46,24 @@ void update_without_ink_shift(View<double, 2> sums, ShiftGradients& gradients, V
                               View<const double, 2> drawn, View<const double, 2> found,
                               View<const double, 3> maps, const layout::Topology& topology);
 
+// Where the points of gridlines (E,) are stated, along the normals (-uy, ux).
+struct GridlinesBetween {
+  Array<double, 1> offset;    // px, from there to where a gridline is seen
+  Array<double, 1> variance;  // px^2, of this place, which covers both places
+};
+
+// The places between the gridlines that join the markers and the lines (E, 8), which are drawn with the
+// shifts.
+GridlinesBetween gridlines_between(View<const double, 2> shift, View<const double, 2> lines,
+                                   View<const double, 3> maps, const layout::Topology& topology);
+
 // Moves the gridlines (E, 8) along their normals by offsets (E,) px.
 void update_with_offsets(View<double, 2> lines, View<const double, 1> offset);
 
-// (M, 2) px, from the markers on which the inks agree to the crossings of the gridlines (E, 8) with shifted
-// inks.
-Array<double, 2> crossing_shifts(View<const double, 2> shift, View<const double, 2> lines,
-                                 View<const double, 3> maps, const layout::Topology& topology,
-                                 const InkShiftLimits& limits);
+// Moves markers (M, 2) px from where the inks agree half of the way to where their gridlines (E, 8) cross;
+// the covariances (M, 2, 2) px^2 cover both places.
+void update_between_places(View<double, 2> xy, View<double, 3> cov, View<const double, 2> shift,
+                           View<const double, 2> lines, View<const double, 3> maps,
+                           const layout::Topology& topology, const InkShiftLimits& limits);
 
 }  // namespace cmp::refine

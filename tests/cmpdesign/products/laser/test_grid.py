@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cmpdesign import laser_grid
+from cmpdesign import kerf
 from cmpdesign.design.design import load_design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.products.laser.coupon.design import Coupon, Patch, coupon_to_json
@@ -143,7 +143,7 @@ def test_the_command_prints_lines_for_the_material_file(tmp_path: Path) -> None:
     result = run("kerf", tmp_path / "grid.json", tmp_path / "grid.png")
     assert result.exit_code == 0, result.stderr
     lines = "\n".join(line for line in result.stdout.splitlines() if line.startswith("cut_"))
-    best = laser_grid(tmp_path / "grid.json", tmp_path / "grid.png").found.best
+    best = kerf(tmp_path / "grid.json", tmp_path / "grid.png").found.best
     assert best is not None and best.passes is not None
     settings = tomllib.loads(lines)
     assert settings["cut_power_percent"]["value"] == best.power_percent
@@ -155,8 +155,6 @@ def test_the_command_prints_lines_for_the_material_file(tmp_path: Path) -> None:
 def test_files_and_pictures_that_are_not_a_grid(tmp_path: Path) -> None:
     with pytest.raises(CmpDesignError, match="ground and sheet differ"):
         _read(tmp_path, GRID, photo_of(0.25, sheet=185.0, ground=195.0, noise=0.3))
-    with pytest.raises(CmpDesignError, match="a coupon for the kerf"):
-        _read(tmp_path, replace(GRID, kind="kerf"), photo_of(0.25))
     cv2.imwrite(str(tmp_path / "grid.png"), np.full((300, 400, 3), 90, np.uint8))
     (tmp_path / "grid.json").write_text(coupon_to_json(GRID), encoding="utf-8")
     assert "five round marks" in refused("kerf", tmp_path / "grid.json", tmp_path / "grid.png")
@@ -165,4 +163,4 @@ def test_files_and_pictures_that_are_not_a_grid(tmp_path: Path) -> None:
 def _read(folder: Path, grid: Coupon, image: NDArray[Any]) -> None:
     (folder / "grid.json").write_text(coupon_to_json(grid), encoding="utf-8")
     cv2.imwrite(str(folder / "grid.png"), image)
-    laser_grid(folder / "grid.json", folder / "grid.png")
+    kerf(folder / "grid.json", folder / "grid.png")
