@@ -6,6 +6,10 @@ known. Errors are RMS per axis against the scene's truth, over all markers and f
 deviations, both with true poses: the one that the extractor's covariances imply for this geometry ("stated"), and the
 Cramer-Rao bound of each view, gridline by gridline ("image"). "err/cov" is the error in units of the covariance that
 is reported for each marker. One core.
+
+The last table has the times of the first sensor for a press that grows and falls by 0.04 mm a frame, the least of all
+frames in turns: "cpu ms" of the processor, in all threads, and "clock ms". A pair is tracked with the preset
+"balanced" from image to surface. On a machine that does other work, only "cpu ms" is a measure.
 """
 
 from __future__ import annotations
@@ -26,12 +30,23 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
 from cmpdesign.scene import Optics, Pinhole, Plain, Scene, Sensor, cramer_rao, render
 from cmpdesign.scene.standard import BLACK_RGB, INKS
-from extractor import Reconstructor, Rig, View, ViewExtractor, parse_layout, triangulate
+from extractor import (
+    Field,
+    Reconstructor,
+    Rig,
+    Shape,
+    ShapeTracker,
+    View,
+    ViewExtractor,
+    parse_layout,
+    triangulate,
+)
 
 Array = NDArray[np.float64]
 Surface = Callable[[Array], Array]
 
 FRAMES, QUICK_FRAMES = 8, 2
+ROUNDS, QUICK_ROUNDS = 12, 2  # of the frames of a press, for times
 DISTORTION = (-0.08, 0.03, 0.0005, -0.0008, 0.0)
 
 
@@ -66,6 +81,9 @@ COLUMNS = {
     "err/image": ".2f", "err/cov": ".2f", "moved um": ".2f", "virtual um": ".2f", "normal deg": ".2f",
     "extract, reconstruct ms": ".0f",
 }  # fmt: skip
+TIMES = {"work": TEXT, "cpu ms": ".2f", "clock ms": ".2f"}
+FIRST_MM, STEP_MM, STEPS = 0.1, 0.04, 10  # of the press whose times are measured
+GRID = 64  # points of a field along each axis
 
 
 def make_cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tuple[Pinhole, ...]:
@@ -170,6 +188,54 @@ class RestedSensor:
         )  # fmt: skip
 
 
+def all_of(shape: Shape) -> Shape:
+    """The shape, with all that is computed when it is asked for."""
+    _ = shape.virtual_xyz_mm, shape.displacement_cov_mm2, shape.displacement_systematic_mm
+    return shape
+
+
+def time_rows(sensor: RestedSensor, rounds: int) -> list[tuple[str, float, float]]:
+    """The rows of ``TIMES``."""
+    depths_mm = FIRST_MM + STEP_MM * np.arange(STEPS)
+    shown = [
+        render(replace(sensor.scene, seed=seed, surface=solve(ELASTOMER, WIDE, Motion(depth)).surface()),
+               size=sensor.size).image
+        for seed, depth in enumerate(depths_mm.tolist())
+    ]  # fmt: skip
+    images = (shown + shown[-2:0:-1]) * rounds
+    reconstructor, least = sensor.reconstructor, dict[str, tuple[float, float]]()
+    markers = [sensor.extractor.extract(image) for image in shown]
+    shape, views = reconstructor.reconstruct(markers[0]), reconstructor.poses.views
+    side = 0.9 * np.abs(reconstructor.layout.xy_mm).max() * np.linspace(-1.0, 1.0, GRID)
+    grid_mm, field = np.stack(np.meshgrid(side, side), axis=2).reshape(-1, 2), Field(reconstructor.layout)
+
+    def reconstruct(number: int) -> Shape:
+        return reconstructor.reconstruct(markers[number % len(markers)])
+
+    def triangulated(number: int) -> object:
+        pair = markers[number % len(markers)]
+        return triangulate(views, np.stack([m.xy_px for m in pair]), np.stack([m.cov_px2 for m in pair]))
+
+    alone, both = (ShapeTracker(reconstructor, threads=threads) for threads in (1, 2))
+    work: dict[str, Callable[[int], object]] = {
+        "pair of views with 3-D, one thread": lambda k: all_of(alone.track(images[k]).shape),
+        "pair of views with 3-D, two threads": lambda k: all_of(both.track(images[k]).shape),
+        "triangulate": triangulated,
+        "reconstruct": reconstruct,
+        "reconstruct, with virtual markers and all covariances": lambda k: all_of(reconstruct(k)),
+        f"field of {GRID} x {GRID} points": lambda k: field.at(shape.displacement_mm, grid_mm),
+    }
+    for number in range(len(images)):
+        for name, call in work.items():
+            started = time.process_time(), time.perf_counter()
+            call(number)
+            spent = 1e3 * (time.process_time() - started[0]), 1e3 * (time.perf_counter() - started[1])
+            least[name] = (
+                spent if name not in least else (min(spent[0], least[name][0]), min(spent[1], least[name][1]))
+            )
+    return [(name, *times) for name, times in least.items()]
+
+
 def angles_deg(normals: Array, xy_mm: Array, surface: Surface | None) -> Array:
     """(M,) angles between the normals found and those of the true surface, by central differences."""
     if surface is None:
@@ -192,19 +258,21 @@ def bound_ratio(error_um: tuple[float, ...], bound_um: tuple[float, ...]) -> flo
 
 
 def measure(quick: bool = False) -> Shown:
-    """One table for every sensor, one row for every state.
+    """One table for every sensor, one row for every state; then the times.
 
     Args:
         quick: two frames of each state.
     """
     frames = QUICK_FRAMES if quick else FRAMES
-    for name, setup in SENSORS.items():
-        sensor = RestedSensor.of(setup)
+    sensors = {name: RestedSensor.of(setup) for name, setup in SENSORS.items()}
+    for name, sensor in sensors.items():
         rows = []
         for state, contact in STATES.items():
             surface = None if contact is None else solve(ELASTOMER, *contact).surface()
             rows.append(sensor.state_row(state, surface, frames))
         yield Table(name, COLUMNS, rows)
+    first = next(iter(sensors.values()))
+    yield Table("least times", TIMES, time_rows(first, QUICK_ROUNDS if quick else ROUNDS))
 
 
 main = Experiment("reconstruction", measure)

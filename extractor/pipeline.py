@@ -49,7 +49,7 @@ from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
 from extractor.refine.relief import points_without_parallax, without_parallax
-from extractor.result import Markers, Origin, Reason, VirtualMarkers
+from extractor.result import VIRTUAL, Markers, Origin, Reason, VirtualMarkers
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
 MIN_LEVEL_EDGE_PX = 7.0  # of the cells at a reduced scale; smaller ones are sought at a finer scale. Chosen
@@ -307,7 +307,7 @@ class ImageReader:
         quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)
         quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
         markers = Markers.with_later(
-            virtual,
+            {VIRTUAL: virtual},
             xy_px=repaired.xy_px,
             cov_px2=repaired.cov_px2,
             status=repaired.status,

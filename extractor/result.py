@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import IntEnum, StrEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.frozen_record import FrozenRecord
+from extractor.frozen_record import LateRecord
 from extractor.quality import Quality
 
 
@@ -102,11 +102,15 @@ class VirtualMarkers(NamedTuple):
     status: NDArray[np.uint8]
 
 
-_NO_VIRTUAL = VirtualMarkers(np.empty((0, 0, 2)), np.empty((0, 0, 2, 2)), np.empty((0, 0), np.uint8))
+VIRTUAL = (
+    "virtual_xy_px",
+    "virtual_cov_px2",
+    "virtual_status",
+)  # attributes of Markers, in the order of VirtualMarkers
 
 
 @dataclass(frozen=True, eq=False)
-class Markers(FrozenRecord):
+class Markers(LateRecord):
     """The M markers of one image by id, and m virtual markers on each of E edges. Can be pickled and copied.
 
     Attributes:
@@ -144,40 +148,14 @@ class Markers(FrozenRecord):
     def __post_init__(self) -> None:
         self._freeze_mappings("timings_ms", "stages")
 
-    @classmethod
-    def with_later(cls, virtual: Callable[[], VirtualMarkers], **fields: Any) -> Markers:
-        """Markers whose virtual markers are computed when they are first asked for, once.
-
-        Args:
-            virtual: computes them, from values that do not change.
-            fields: all other attributes.
-        """
-        made = cls(
-            **{name: getattr(_NO_VIRTUAL, name.removeprefix("virtual_")) for name in _VIRTUAL}, **fields
-        )
-        for name in _VIRTUAL:
-            del made.__dict__[name]
-        made.__dict__["_virtual"] = virtual
-        return made
-
-    if not TYPE_CHECKING:  # it is called for an attribute that is not there
-
-        def __getattr__(self, name: str) -> Any:
-            """A virtual marker's attribute, computed with the others at the first use."""
-            if name not in _VIRTUAL or "_virtual" not in self.__dict__:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            found = self._virtual()
-            self.__dict__.update({each: getattr(found, each.removeprefix("virtual_")) for each in _VIRTUAL})
-            return self.__dict__[name]
-
     def moved(self, offset_px: tuple[float, float]) -> Markers:
         """The same markers in a frame whose origin lies this offset (px) further left and up."""
 
         def virtual() -> VirtualMarkers:
             return VirtualMarkers(self.virtual_xy_px + offset_px, self.virtual_cov_px2, self.virtual_status)
 
-        others = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _VIRTUAL}
-        return Markers.with_later(virtual, **{**others, "xy_px": self.xy_px + offset_px})
+        others = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in VIRTUAL}
+        return Markers.with_later({VIRTUAL: virtual}, **{**others, "xy_px": self.xy_px + offset_px})
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.counts.items())
@@ -214,6 +192,3 @@ class Markers(FrozenRecord):
         """The remedy of the reason, and the hints of the quality; empty without both."""
         reason = () if self.reason is None else (self.reason.text,)
         return reason + (() if self.quality is None else self.quality.hints)
-
-
-_VIRTUAL = ("virtual_xy_px", "virtual_cov_px2", "virtual_status")

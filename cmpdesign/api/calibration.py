@@ -259,7 +259,7 @@ def calibrate_rig(
         from cmpdesign.files.atomic import write_file
 
         dated = [name for whole in names[: len(given)] for name in whole.split(",")]
-        text = calibrated_text(sensor, calibration, len(given), tuple(ways), _date_of(dated))
+        text = calibrated_text(sensor, calibration, reference, len(given), tuple(ways), _date_of(dated))
         write_file(Path(output), text)
     return _rig_document(calibration, str(output or ""), len(given), tuple(ways))
 
@@ -325,6 +325,7 @@ def calibrate_check(
             "calibrate rig"
         )
     reference = reference_from(file.layout if layout is None else layout)
+    file.require_layout(reference)
     names = [str(images)] if isinstance(images, str | Path) else [str(one) for one in images]
     found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
     before = file.table.calibration.rig

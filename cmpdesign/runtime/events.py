@@ -1,4 +1,4 @@
-"""What happened to the cameras of a running sensor."""
+"""What happened to the cameras of a running sensor, and to its health."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ class EventKind(StrEnum):
     RESUMED = "resumed"  # frames again, after a gap
     ENDED = "ended"  # a recorded source has no more frames
     HELD = "held"  # the driver does not give the camera back
+    HEALTH = "health"  # new advice: what to clean, focus, light or zero, with the figure
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Event:
 
     Attributes:
         kind: what happened.
-        camera: the camera's name.
+        camera: the camera's name; "" of a ``HEALTH`` event.
         text: one sentence.
         unix_s: when it was noticed, s since 1970.
         gap_ms: time without a frame, so far or altogether.
@@ -44,7 +45,7 @@ class Event:
     gap_ms: float = 0.0
 
     def __str__(self) -> str:
-        return f"{self.camera}: {self.text}"
+        return f"{self.camera}: {self.text}" if self.camera else self.text
 
 
 class EventLog:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -16,7 +18,9 @@ from cmpdesign.sensor.tables import LimitsTable
 if TYPE_CHECKING:
     from extractor import Markers, Quality, Reference
 
-FRAMES = 256  # over which times are counted; chosen
+FRAMES = 4096  # over which times are counted; chosen: 40 of them lie above the 99th percentile
+ADVISED_FRAMES, EVERY_FRAMES = 256, 8  # for the advice that becomes events, and how often; chosen, for time
+TOLD_AGAIN_S = 60.0  # after which an advice that had gone is an event again; chosen
 RECENT = 16  # frames whose median is compared with the rest; chosen
 MAX_BLUR_RATIO = 1.5  # blurred by 1.5 times as much, the deviations of markers double; chosen
 MIN_LIGHT, MAX_TINT = 0.7, 1.15  # of the light at rest, and of a channel over the mean of all; chosen
@@ -234,3 +238,20 @@ def _advice(
 def _reason_text(frame: SensorFrame) -> str:
     texts = [view.markers.reason.text for view in frame.views if view.markers.reason is not None]
     return "; ".join(dict.fromkeys(texts)) or frame.reason
+
+
+class ToldAdvice:
+    """Which advice is new: not told, or gone for a minute. Its figures may change."""
+
+    def __init__(self) -> None:
+        self._seen_s: dict[str, float] = {}
+
+    def new(self, advice: Sequence[str]) -> list[str]:
+        """Those of the present advice that are new; call it again and again."""
+        now_s, found = time.monotonic(), []
+        for one in advice:
+            topic = re.sub(r"[\d.]+", "", one)
+            if now_s - self._seen_s.get(topic, -TOLD_AGAIN_S) >= TOLD_AGAIN_S:
+                found.append(one)
+            self._seen_s[topic] = now_s
+        return found

@@ -108,7 +108,8 @@ def plan_of(file: SensorFile, outputs: Iterable[str] | None) -> SensorPlan:
         outputs: of ``OUTPUTS``; None: all that the file allows, without virtual markers.
 
     Raises:
-        SensorError: the file lacks what an output needs, or there is no such output.
+        SensorError: the file lacks what an output needs, its rig was calibrated with another pad, or there is no such
+            output.
         SourceError: no such camera, or several.
     """
     from extractor import load_layout
@@ -131,6 +132,7 @@ def plan_of(file: SensorFile, outputs: Iterable[str] | None) -> SensorPlan:
             f'{file.path}: [camera] names no source; give the camera\'s number or name: source = "0"'
         )
     layout = load_layout(file.layout)
+    file.require_layout(layout)
     if "virtual" not in wanted:
         layout = replace(layout, virtual_per_edge=0)
     has_shape = "shape" in wanted or (gel is not None and views > 1)

@@ -10,8 +10,18 @@ from typing import TYPE_CHECKING, Any
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.runtime.camera import Camera, CameraFrame
 from cmpdesign.runtime.events import Event as SensorEvent
-from cmpdesign.runtime.events import EventLog
-from cmpdesign.runtime.health import FRAMES, AtRest, Health, Past, health_of, past_of
+from cmpdesign.runtime.events import EventKind, EventLog
+from cmpdesign.runtime.health import (
+    ADVISED_FRAMES,
+    EVERY_FRAMES,
+    FRAMES,
+    AtRest,
+    Health,
+    Past,
+    ToldAdvice,
+    health_of,
+    past_of,
+)
 from cmpdesign.runtime.pairing import newest_set
 from cmpdesign.runtime.plan import SensorPlan
 from cmpdesign.runtime.result import SensorFrame
@@ -52,6 +62,7 @@ class Sensor:
         self._log, self._changed = EventLog(), Condition()
         self._results: deque[SensorFrame] = deque(maxlen=KEPT_RESULTS)
         self._past: deque[Past] = deque(maxlen=FRAMES)
+        self._told = ToldAdvice()
         self.tracker: Tracker | ContactTracker | ShapeTracker | None = None
         self._rest: AtRest | None = None
         self._closing, self._failure = Event(), ""
@@ -68,7 +79,7 @@ class Sensor:
 
     @property
     def events(self) -> tuple[SensorEvent, ...]:
-        """What happened to the cameras, the newest last."""
+        """What happened to the cameras and the health, the newest last."""
         return self._log.since(0)
 
     def events_since(self, count: int) -> tuple[SensorEvent, ...]:
@@ -89,8 +100,11 @@ class Sensor:
         """
         if not self._results:
             raise LateError(self._late_text("there is no result"))
+        return self._health(FRAMES)
+
+    def _health(self, frames: int) -> Health:
         with self._changed:
-            newest, past = self._results[-1], tuple(self._past)
+            newest, past = self._results[-1], tuple(self._past)[-frames:]
         limits = self.plan.file.table.limits
         return health_of(newest, past, self._rest, self.plan.layout, limits, self._log.count)
 
@@ -162,7 +176,7 @@ class Sensor:
             self._thread.join(CLOSE_S)
 
     def _late_text(self, text: str) -> str:
-        events = self.events
+        events = [one for one in self.events if one.kind is not EventKind.HEALTH]
         why = self._failure or (str(events[-1]) if events else "")
         return f"{self.name}: {text}" + (f" ({why})" if why else "")
 
@@ -186,6 +200,9 @@ class Sensor:
                     self.count += 1
                     self._past.append(past)
                     self._changed.notify_all()
+                if self.count % EVERY_FRAMES == 0:
+                    for advice in self._told.new(self._health(ADVISED_FRAMES).advice):
+                        self._log.add(EventKind.HEALTH, "", advice)
         except Exception as error:  # a fault of the reader must reach those who wait
             self._failure = f"the reader failed: {type(error).__name__}: {' '.join(str(error).split())}"
             raise

@@ -12,8 +12,8 @@ from cmpdesign.inputs.documents import parse_toml
 from cmpdesign.inputs.files import path_exists, read_text
 from cmpdesign.inputs.validation import validation_message
 from cmpdesign.sensor.tables import SensorError, SensorTable
-from extractor import Rig, parse_rig
-from extractor.errors import ExtractorError
+from extractor import Reference, Rig, parse_rig
+from extractor.errors import ExtractorError, RigError
 from extractor.space.rig import READ_TABLES
 
 
@@ -57,6 +57,17 @@ class SensorFile:
             if elastomer is None or elastomer.gel is None
             else self._named("elastomer.gel", elastomer.gel)
         )
+
+    def require_layout(self, layout: Reference) -> None:
+        """Check that the rig was calibrated with the pad of this layout.
+
+        Raises:
+            SensorError: the calibration is older than the pad.
+        """
+        try:
+            self.rig.require_layout(layout)
+        except RigError as error:
+            raise SensorError(f"{self.path}: {error}") from None
 
     def _named(self, field: str, name: str) -> Path:
         path = self.path.parent / name

@@ -133,6 +133,7 @@ class RigCalibrationTable(_StrictTable):
     """What ``calibrate rig`` found."""
 
     date: datetime.date | None = None
+    layout_digest: Line = ""
     pictures: int = 0
     steps_mm: tuple[float, ...] = ()
     rms_px: tuple[float, ...] = ()

@@ -22,6 +22,7 @@ _MEDIAN_TO_SIGMA = 1.4826  # of normal errors
 _COVERED = 0.999  # share of a pixel that cells cover
 _POWERS = ((0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (2, 0))  # of y and x
 _PIXEL_VARIANCE = 1 / 12  # of a box
+_BLURS2_PX2 = (0.1**2, 20.0**2)  # that can be drawn
 _DECIMALS = 3  # of a path on the screen, mm
 
 
@@ -103,7 +104,7 @@ def residual_picture(image: NDArray[Any], reference: Reference, markers: Markers
     Args:
         image: (H, W, 3) uint8 BGR.
         reference: the layout.
-        markers: of the image.
+        markers: of the image, with their ``stages``.
 
     Returns:
         (H, W, 3) uint8 BGR: 128 where nothing is left and outside of the cells, 0 and 255 at ``RESIDUAL_SIGMAS``
@@ -153,8 +154,7 @@ def _ink_coverage(reference: Reference, markers: Markers, size_px: tuple[int, in
     sides = np.concatenate([corners_px, np.roll(corners_px, -1, axis=1)], axis=2).reshape(-1, 4)
     owner = np.repeat(np.arange(len(corners_px)), corners_px.shape[1])
     values = (color[:, None] == np.unique(color)).astype(np.float64)
-    assert markers.quality is not None
-    blur_px = float(np.sqrt(max(markers.quality.blur_px**2 - _PIXEL_VARIANCE, 0.01)))
-    return draw_coverage(
-        PolygonSegments(sides, owner), values, size_px, make_point_spread(min(blur_px, 20.0))
-    )
+    refined = markers.stages["refine"]  # its blur has the pixel of the image at the scale of refinement
+    blur2_px2 = refined.blur_px**2 - refined.appearance.scale**2 * _PIXEL_VARIANCE
+    spread = make_point_spread(float(np.sqrt(np.clip(blur2_px2, *_BLURS2_PX2))))
+    return draw_coverage(PolygonSegments(sides, owner), values, size_px, spread)

@@ -217,7 +217,7 @@ class Readings:
         image = verifier.read(reading.file)
         markers = markers if markers.stages else verifier.extractor.extract(image)
         stages = draw_stages(image, verifier.reference, markers)
-        if markers.found and markers.quality is not None and np.isfinite(markers.quality.blur_px):
+        if markers.found and "refine" in markers.stages:
             stages["residual"] = residual_picture(in_8_bits(image), verifier.reference, markers)
         self._stages = (reading.key, stages)
         return stages

@@ -27,14 +27,6 @@ from numpy.typing import NDArray
 from extractor._native import layout as native
 
 CHORD = np.array([-1.0, 1.0])  # of the offsets of a gridline's start and end
-# Of l and a in the products of the offset t (1 - t) (l (1 - t) - a t) with 1 - t and with t. Derived.
-BENT_SUMS = np.array([[1 / 20, 1 / 30], [-1 / 30, -1 / 20]])
-MEMBERS = 7  # a marker and its neighbours
-INNER_MARKERS = 37  # whose covariances are compared with those of the outermost layers; chosen: three rings
-COUPLING_ROUNDS = (
-    3  # of the couplings by their covariances: the third changes them by less than 0.1 %. Chosen
-)
-MIN_SUM = 1e-6  # of a marker's block; derived: it only keeps a division from failing
 SIDE_SUMS = (
     np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
 )  # of products of straight lines along a gridline, by their ends
@@ -52,18 +44,20 @@ class SlopeWeights(NamedTuple):
     leave: NDArray[np.float64]
     arrive: NDArray[np.float64]
 
+    def curved_at(self, edges: NDArray[np.int64], is_curved: NDArray[np.bool_]) -> SlopeWeights:
+        """The weights where second derivatives count as 0 at markers that are not ``is_curved`` (M,)."""
+        share = np.repeat(is_curved[edges].astype(np.float64), self.ids.shape[1] // 2, axis=1)
+        shares = np.stack([np.ones_like(share), share])
+        return SlopeWeights(self.ids, self.leave * shares, self.arrive * shares)
+
 
 def slope_weights(
     stencil: NDArray[np.float64],
     ring_markers: NDArray[np.int32],
     edges: NDArray[np.int64],
     edge_vectors: NDArray[np.float64],
-    is_curved: NDArray[np.bool_],
 ) -> SlopeWeights:
-    """The weights; the arguments are ``derivative_stencil`` and others of ``Topology``.
-
-    Second derivatives count as 0 at markers that are not ``is_curved`` (M,).
-    """
+    """The weights; the arguments are ``derivative_stencil`` and others of ``Topology``."""
     x, y = edge_vectors.T
     ids, first, second, chord = [], [], [], []
     for at in (0, 1):
@@ -74,7 +68,7 @@ def slope_weights(
         weights = stencil[marker]
         first.append(_with_own(x[:, None] * weights[:, 0] + y[:, None] * weights[:, 1]))
         curved = np.stack([x * x, 2 * x * y, y * y], axis=1)
-        second.append(_with_own(np.einsum("ed,edk->ek", curved, weights[:, 2:]) * is_curved[marker, None]))
+        second.append(_with_own(np.einsum("ed,edk->ek", curved, weights[:, 2:])))
         chord.append(np.zeros_like(first[at]))
         chord[at][:, -1] = CHORD[at]
     nothing, both_chords = np.zeros_like(first[0]), np.concatenate(chord, axis=1)
@@ -140,75 +134,7 @@ def covariance_couplings(
     equally strong gridlines, and with the markers beyond the neighbours held in place, which changes their ratio by
     1 %.
     """
-    inner, rim = np.flatnonzero(gridlines.is_inner)[:INNER_MARKERS], np.flatnonzero(~gridlines.is_inner)
-    if len(inner) == 0:
-        return couplings
-    found = couplings.copy()
-    inside, outside = (_Neighbourhoods(which, slopes, gridlines) for which in (inner, rim))
-    for way in (0, 1):
-        own = found[:, 3 * way : 3 * way + 3]
-        usual = np.einsum("rij,rji->r", inside.sandwich[way], np.linalg.inv(inside.inverse(own))).mean() / 2
-        needed = outside.along_normals(outside.sandwich[way]) / usual
-        for _ in range(COUPLING_ROUNDS):
-            outside.scale_own_ends(own, outside.along_normals(outside.inverse(own)) / needed)
-    return found
-
-
-class _Neighbourhoods:
-    """R markers, each with its neighbours: seven members, the marker first.
-
-    Attributes:
-        sandwich: (2, R, 2, 2) the covariances of the markers, by tangents and by second derivatives.
-    """
-
-    def __init__(self, which: NDArray[np.int64], slopes: SlopeWeights, gridlines: LayoutGridlines) -> None:
-        edges, spokes = gridlines.edges, gridlines.spokes.astype(np.int64)
-        own, known = spokes[which], spokes[which] >= 0
-        others = np.where(known, edges[own].sum(axis=2) - which[:, None], -1)
-        members = np.concatenate([which[:, None], others], axis=1)
-        self._spokes, self._is_known = own, known
-        self._lines = lines = np.where((members >= 0)[..., None], spokes[members], -1)  # (R, 7, 6)
-        self._side = side = (edges[lines, 1] == members[..., None]).astype(np.int64)
-        across = np.stack([-gridlines.vectors[:, 1], gridlines.vectors[:, 0]], axis=1)
-        length = np.linalg.norm(across, axis=1)
-        self._normals = normals = across / length[:, None]
-        strength = np.where(lines >= 0, (length * gridlines.is_seen)[lines], 0.0)
-        self._pulls = strength[..., None, None] * normals[lines][..., :, None] * normals[lines][..., None, :]
-        other = edges[lines, 1 - side]
-        self._own = np.broadcast_to(np.eye(MEMBERS)[:, None], (*lines.shape, MEMBERS))
-        self._other = (other[..., None] == members[:, None, None]).astype(np.float64)
-        straight = self._own / 3 + self._other / 6
-        spread = self._system(straight)
-        is_member = (slopes.ids[lines][..., None] == members[:, None, None, None]).astype(np.float64)
-        by_end = np.einsum("se,swnk->wenk", BENT_SUMS, np.stack([slopes.leave, slopes.arrive]))
-        self.sandwich = np.empty((2, len(which), 2, 2))
-        for way in (0, 1):
-            bent = (by_end[way, side, lines][..., None, :] @ is_member)[..., 0, :]
-            response = np.linalg.inv(self._system(straight + bent))
-            self.sandwich[way] = (response @ spread @ np.swapaxes(response, 1, 2))[:, :2, :2]
-
-    def inverse(self, couplings: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(R, 2, 2) the markers' blocks of the inverse of the information with couplings (E, 3)."""
-        own = np.take_along_axis(couplings[self._lines], self._side[..., None], axis=3)
-        between = couplings[self._lines, 2][..., None]
-        blocks = self._system(own * self._own / 3 + between * self._other / 6)
-        return np.asarray(np.linalg.inv(blocks)[:, :2, :2], np.float64)
-
-    def along_normals(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(R, 6) the variances along the normals of the markers' gridlines, of covariances (R, 2, 2)."""
-        across = self._normals[self._spokes]
-        return np.asarray(np.einsum("rki,rij,rkj->rk", across, covariance, across))
-
-    def scale_own_ends(self, couplings: NDArray[np.float64], factor: NDArray[np.float64]) -> None:
-        """Multiply the couplings (E, 3) of the gridlines' ends at the markers by factors (R, 6)."""
-        known, side = self._is_known, self._side[:, 0]
-        couplings[self._spokes[known], side[known]] *= factor[known]
-
-    def _system(self, pulls: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(R, 14, 14) the sums over the gridlines of pulls (R, 7, 6, 7) of members on members."""
-        blocks = np.einsum("rmkn,rmkij->rminj", pulls, self._pulls, optimize=True)
-        size = 2 * MEMBERS
-        return np.asarray(blocks.reshape(-1, size, size) + MIN_SUM * np.eye(size))
+    return native.covariance_couplings(couplings, slopes, gridlines)
 
 
 def scatter_bending(

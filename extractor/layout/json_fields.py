@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Iterable, Sequence
 from itertools import chain
@@ -115,6 +114,8 @@ def require_version_2(container: dict[str, Any], names: Sequence[str], prefix: s
 
 def nearest_name(word: str, known: Sequence[str]) -> str:
     """The part of a message that states the nearest known name; empty if no known name is near."""
+    import difflib
+
     found = difflib.get_close_matches(word[:60], known, n=1, cutoff=0.6)
     return f" (did you mean {found[0]}?)" if found else ""
 

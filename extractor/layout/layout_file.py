@@ -10,7 +10,6 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,7 +22,6 @@ from extractor.layout.consistency import MAX_CODE, MAX_VIRTUAL_PER_EDGE
 from extractor.layout.reference import BLACK, COLORS, PadCode, Reference
 from extractor.layout.text_file import printable_path, read_text_file
 
-SCHEMA_PATH = Path(__file__).parent.parent / "layout.schema.json"
 MAX_BYTES = 1 << 26  # of a layout file; 200 layers take 23 MiB
 FIELDS = (
     "format", "version", "units", "pattern", "parameters", "markers", "cells", "edges", "virtual_per_edge",

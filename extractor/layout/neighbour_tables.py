@@ -42,6 +42,6 @@ def ring_weights(marker_mm: NDArray[np.float64], table: NDArray[np.int32]) -> ND
         map_rows = rows[selected, :, :terms]
         gram = np.swapaxes(map_rows, 1, 2) @ map_rows
         regular = np.linalg.eigvalsh(gram)[:, 0] > MIN_EIGENVALUE * count[selected]
-        solutions = np.linalg.solve(gram[regular], np.swapaxes(map_rows[regular], 1, 2))[:, 0]
-        weights[np.flatnonzero(selected)[regular]] = solutions
+        first = np.linalg.solve(gram[regular], np.eye(terms)[:, :1])
+        weights[np.flatnonzero(selected)[regular]] = (map_rows[regular] @ first)[..., 0]
     return weights

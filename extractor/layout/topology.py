@@ -102,10 +102,8 @@ def topology_of(layout: Reference) -> Topology:
     edge_vectors = chord / length.mean()
     # from one side, scatter makes more second derivatives than bending does: the rim's count as 0, and what is left
     # out may be as large as what scatter would make
-    slopes, all_slopes = (
-        slope_weights(stencil, ring_markers, edges, edge_vectors, is_curved)
-        for is_curved in (np.all(spokes >= 0, axis=1), np.ones(len(spokes), np.bool_))
-    )
+    all_slopes = slope_weights(stencil, ring_markers, edges, edge_vectors)
+    slopes = all_slopes.curved_at(edges, np.all(spokes >= 0, axis=1))
     couplings = end_couplings(slopes, edges)
     is_inner: NDArray[np.bool_] = np.all(ring_markers >= 0, axis=1)
     is_seen: NDArray[np.bool_] = np.any(edge_cells >= 0, axis=1)
@@ -225,23 +223,23 @@ def _derivative_stencil(
     every = known.astype(np.float64)
     fits = (quadratic, near, ridge, first), (cubic, even, 0.0, first), (quadratic, every, ridge, second)
     for terms, weight, added, rows in fits:
-        solutions, regular = _least_squares(terms[enough], weight[enough], added)
-        out[enough[regular], rows] = solutions[regular, rows]
+        solutions, regular = _least_squares(terms[enough], weight[enough], added, rows)
+        out[enough[regular], rows] = solutions
     return out
 
 
 def _least_squares(
-    terms: NDArray[np.float64], weight: NDArray[np.float64], ridge: NDArray[np.float64] | float
+    terms: NDArray[np.float64], weight: NDArray[np.float64], ridge: NDArray[np.float64] | float, rows: slice
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(n, T, K) the weights that give T coefficients from K values, and (n,) whether the values determine them.
+    """(r, R, K) the weights that give R coefficients from K values; (n,) whether the values determine all, r times.
 
     Args:
         terms: (n, K, T). weight: (n, K), of the values. ridge: (T,), added to the diagonal of the normal equations.
+        rows: the R coefficients of the T.
     """
     weighted = np.swapaxes(terms * weight[..., None], 1, 2)
     gram = weighted @ terms + ridge * np.eye(terms.shape[2])
     eigenvalues = np.linalg.eigvalsh(gram)
     regular = eigenvalues[:, -1] < MAX_CONDITION * eigenvalues[:, 0]
-    solutions = np.zeros(weighted.shape)
-    solutions[regular] = np.linalg.solve(gram[regular], weighted[regular])
-    return solutions, regular
+    by_row = np.linalg.solve(gram[regular], np.eye(terms.shape[2])[:, rows])
+    return np.swapaxes(by_row, 1, 2) @ weighted[regular], regular

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import space as native
 from extractor.layout.reference import Reference
 from extractor.numeric.nearest_points import nearest_points
 from extractor.space.camera import Array, is_finite
@@ -83,9 +84,8 @@ class Field:
             values: NaN where unknown.
         """
         known = is_finite(values)
-        stencil, near = self._stencil(known), self._ring_markers
-        differences = np.where(known[near][..., None], values[near] - values[:, None], 0.0)
-        return np.asarray(np.swapaxes(stencil @ differences, 1, 2))
+        values = np.ascontiguousarray(values, np.float64)
+        return native.gradients(self._stencil(known), self._ring_markers, values)
 
     def _stencil(self, known: NDArray[np.bool_]) -> Array:
         """(M, 2, K) weights of the differences to the known markers of two rings; NaN where these are too few.
@@ -93,8 +93,8 @@ class Field:
         The method is least squares, weighted by the inverse square of the distance. The last result is kept, because
         the same markers are usually known in the next frame.
         """
-        key = known.tobytes()
-        if self._last_stencil is None or self._last_stencil[0] != key:
+        key, last = known.tobytes(), self._last_stencil  # another thread may change the last one
+        if last is None or last[0] != key:
             near = self._ring_markers
             usable = (near >= 0) & known[near] & known[:, None]
             vectors = np.where(usable[..., None], self.xy_mm[near] - self.xy_mm[:, None], 0.0)
@@ -102,8 +102,8 @@ class Field:
             for terms, needed in ((2, 2), (5, MIN_QUADRATIC_NEIGHBOURS), (9, MIN_CUBIC_NEIGHBOURS)):
                 markers = np.flatnonzero(usable.sum(axis=1) >= needed)
                 self._fill_stencil_weights(vectors / self._edge_mm, usable, terms, markers, stencil)
-            self._last_stencil = key, stencil
-        return self._last_stencil[1]
+            self._last_stencil = last = key, stencil
+        return last[1]
 
     def _fill_stencil_weights(
         self,
@@ -178,7 +178,8 @@ class Field:
 
     def _places_of(self, xy_mm: Array) -> _Places:
         """The places of points; the last ones are kept, because grids stay the same from frame to frame."""
-        if self._last_places is None or not np.array_equal(self._last_places.xy_mm, xy_mm):
+        last = self._last_places
+        if last is None or not np.array_equal(last.xy_mm, xy_mm):
             triangle, inside = self.find(xy_mm)
             hit = np.flatnonzero(triangle >= 0)
             corners, inside = self.triangles[triangle[hit]], inside[hit]
@@ -186,8 +187,8 @@ class Field:
             units = np.tile(np.eye(9).reshape(3, 3, 9), (len(hit), 1, 1, 1))
             values, slopes = units[:, :, 0], np.moveaxis(units[:, :, 1:], 2, 3)
             weights = clough_tocher(self.xy_mm[corners], values, slopes, inside)
-            self._last_places = _Places(xy_mm.copy(), hit, corners, inside, weights)
-        return self._last_places
+            self._last_places = last = _Places(xy_mm.copy(), hit, corners, inside, weights)
+        return last
 
 
 def normals_of(slopes: Array) -> Array:
@@ -195,19 +196,6 @@ def normals_of(slopes: Array) -> Array:
     (ax, ay, az), (bx, by, bz) = slopes.transpose(2, 1, 0)
     normal = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
     return np.asarray(normal / np.sqrt(np.einsum("mk,mk->m", normal, normal))[:, None])
-
-
-def hermite_along_edge(start: Array, end: Array, slope: Array, slope_end: Array, fraction: Array) -> Array:
-    """(E, m, k) cubic Hermite interpolation, which Clough and Tocher's field is on an edge.
-
-    Args:
-        start, end: (E, k) values at the ends of E edges.
-        slope, slope_end: (E, k) their derivatives by the fraction.
-        fraction: (m,) from 0 to 1.
-    """
-    t = fraction[:, None]
-    parts = ((1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t), t * (1 - t) ** 2, -t * t * (1 - t))
-    return np.asarray(np.concatenate(parts, axis=1) @ np.stack([start, end, slope, slope_end], axis=1))
 
 
 def clough_tocher(xy: Array, values: Array, gradients: Array, inside: Array) -> Array:

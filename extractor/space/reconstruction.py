@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import space as native
 from extractor.errors import PoseError
+from extractor.frozen_record import LateRecord
 from extractor.layout.layout_file import LayoutLike, layout_of
-from extractor.result import SIDE_REASONS, Markers, Status, VirtualStatus
+from extractor.result import SIDE_REASONS, Markers, Status
 from extractor.space.camera import Array, View, is_finite
-from extractor.space.field import Field, hermite_along_edge, normals_of
+from extractor.space.field import Field, normals_of
 from extractor.space.pose import Poses, estimate_poses
 from extractor.space.rig import Rig
 from extractor.space.triangulation import (
@@ -30,11 +33,40 @@ from extractor.space.triangulation import (
 MAX_DEVIATION_EDGES = 0.1  # standard deviation of a position above which it is not reported, in edges; chosen
 NEIGHBOURHOOD_SIGMAS = 1.4  # RMS misfit of two rings of markers above which covariances are inflated; chosen
 MIN_REST_MARKERS = 3  # markers that must have a position at rest; derived: a plane
+SURFACE = (  # attributes of Shape that need the surface's gradients
+    "normals",
+    "virtual_xyz_mm",
+    "virtual_cov_mm2",
+    "virtual_displacement_mm",
+    "virtual_normals",
+    "virtual_status",
+)
+
+
+class SurfaceMarkers(NamedTuple):
+    """M markers on a surface: their places, covariances, gradients (M, 3, 2) and normals, as in ``Shape``."""
+
+    xyz_mm: Array
+    cov_mm2: Array
+    slopes: Array
+    normals: Array
+
+
+class SurfacePoints(NamedTuple):
+    """The virtual markers of a surface, as in ``Shape``."""
+
+    xyz_mm: Array
+    cov_mm2: Array
+    normals: Array
+    status: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class Shape(LateRecord):
     """The surface in one frame, in mm of the layout frame; NaN where unknown. Can be pickled and copied.
+
+    A reconstructor's result computes normals and virtual markers, the covariances of displacements, and their
+    systematic part when they are first asked for.
 
     Attributes:
         xyz_mm: (M, 3) float64, the markers by id.
@@ -112,6 +144,7 @@ class Reconstructor:
 
     Raises:
         PoseError: fewer than two views, a view whose pose cannot be estimated, or views that give no depth.
+        RigError: the rig was calibrated with another pad.
     """
 
     def __init__(
@@ -128,6 +161,7 @@ class Reconstructor:
         if len(rig.views) < 2:
             raise PoseError(f"the rig has {len(rig.views)} view; depth needs two or more")
         self.layout = layout = layout_of(layout)
+        rig.require_layout(layout)
         self.rig = rig
         self.field = Field(layout)
         edge_mm = np.linalg.norm(np.diff(layout.xy_mm[layout.edges], axis=1)[:, 0], axis=1)
@@ -158,7 +192,9 @@ class Reconstructor:
             if rest is not None
             else np.zeros((len(self._deviating), *flat.shape))
         )
-        self._rest_virtual_mm = self._virtual(self.rest_xyz_mm, self.field.gradients(self.rest_xyz_mm))
+        slopes, exact = self.field.gradients(self.rest_xyz_mm), np.zeros((len(flat), 3, 3))
+        at_rest = SurfaceMarkers(self.rest_xyz_mm, exact, slopes, normals_of(slopes))
+        self._rest_virtual_mm = self._virtual(at_rest).xyz_mm
 
     def reconstruct(self, markers: Sequence[Markers | None]) -> Shape:
         """The surface that the views show; a view without a pattern raises no error.
@@ -174,26 +210,27 @@ class Reconstructor:
         ]
         status = np.max(by_view, axis=0)
         status = np.where(points.reason == PointReason.NONE, status, Status.LOST).astype(np.uint8)
-        slopes = self.field.gradients(points.xyz_mm)
-        normals = normals_of(slopes)
-        virtual_mm = self._virtual(points.xyz_mm, slopes)
-        known = np.isfinite(np.einsum("emk->em", virtual_mm))
-        cov = points.cov_mm2 + _propagate_covariance(points.by_pose, self.poses.cov)
-        return Shape(
+        cov_mm2 = points.cov_mm2 + _propagate_covariance(points.by_pose, self.poses.cov)
+
+        def surface() -> tuple[NDArray[Any], ...]:
+            slopes = self.field.gradients(points.xyz_mm)
+            normals = normals_of(slopes)
+            found = self._virtual(SurfaceMarkers(points.xyz_mm, cov_mm2, slopes, normals))
+            moved_mm = found.xyz_mm - self._rest_virtual_mm
+            return normals, found.xyz_mm, found.cov_mm2, moved_mm, found.normals, found.status
+
+        return Shape.with_later(
+            {
+                SURFACE: surface,
+                ("displacement_cov_mm2",): lambda: [self._displacement_cov(points, cov_mm2)],
+                ("displacement_systematic_mm",): lambda: [self._systematic_mm(kept, points.xyz_mm)],
+            },
             xyz_mm=points.xyz_mm,
-            cov_mm2=cov,
+            cov_mm2=cov_mm2,
             displacement_mm=points.xyz_mm - self.rest_xyz_mm,
-            displacement_cov_mm2=self._displacement_cov(points),
-            normals=normals,
             status=status,
             reason=points.reason,
             misfit=points.misfit,
-            virtual_xyz_mm=virtual_mm,
-            virtual_cov_mm2=self._virtual_cov(cov, known),
-            virtual_displacement_mm=virtual_mm - self._rest_virtual_mm,
-            virtual_normals=self._virtual_normals(normals, known),
-            displacement_systematic_mm=self._systematic_mm(kept, points.xyz_mm),
-            virtual_status=np.where(known, VirtualStatus.INTERPOLATED, VirtualStatus.LOST).astype(np.uint8),
             problem=problem,
         )
 
@@ -322,44 +359,17 @@ class Reconstructor:
         variance = np.mean([np.nanmedian(np.trace(m.cov_px2, axis1=1, axis2=2)) / 2 for m in rest])
         return float(np.sqrt(max(0.0, np.mean(inliers**2) - 1) * variance))
 
-    def _displacement_cov(self, points: Points) -> Array:
+    def _displacement_cov(self, points: Points, cov_mm2: Array) -> Array:
         if self._rest is None:
-            return points.cov_mm2 + _propagate_covariance(points.by_pose, self.poses.cov)
+            return cov_mm2
         moved = points.by_pose - self._rest.by_pose
         return points.cov_mm2 + self._rest.cov_mm2 + _propagate_covariance(moved, self.poses.cov)
 
-    def _virtual(self, xyz_mm: Array, slopes: Array) -> Array:
-        """(E, m, 3) mm, the virtual markers on the smooth surface through markers (M, 3) with gradients (M, 3, 2).
-
-        Where too few neighbours are known, the chord replaces the slope.
-        """
+    def _virtual(self, markers: SurfaceMarkers) -> SurfacePoints:
+        """The virtual markers on the smooth surface; where too few neighbours are known, the chord is the slope."""
         start, end = self.layout.edges.T
-        step = self.layout.xy_mm[end] - self.layout.xy_mm[start]
-        chord = xyz_mm[end] - xyz_mm[start]
-        at_ends = [(slopes[ids] @ step[:, :, None])[..., 0] for ids in (start, end)]
-        first, last = (np.where(np.isfinite(slope), slope, chord) for slope in at_ends)
-        return hermite_along_edge(xyz_mm[start], xyz_mm[end], first, last, self._fractions)
-
-    @property
-    def _fractions(self) -> Array:
-        count = self.layout.virtual_per_edge
-        return (np.arange(count) + 1.0) / (count + 1)
-
-    def _virtual_cov(self, cov: Array, known: NDArray[np.bool_]) -> Array:
-        """(E, m, 3, 3) mm^2, from the covariances (M, 3, 3) of the edge's markers, without the slopes at its ends."""
-        share = (3 * self._fractions**2 - 2 * self._fractions**3)[:, None]
-        both = np.concatenate([(1 - share) ** 2, share**2], axis=1)
-        virtual = (both @ cov.reshape(len(cov), 9)[self.layout.edges]).reshape(*known.shape, 3, 3)
-        virtual[~known] = np.nan
-        return np.asarray(virtual)
-
-    def _virtual_normals(self, normals: Array, known: NDArray[np.bool_]) -> Array:
-        """(E, m, 3) unit vectors between the normals (M, 3) of the edge's markers."""
-        t = self._fractions[:, None]
-        mixed = np.concatenate([1 - t, t], axis=1) @ normals[self.layout.edges]
-        mixed /= np.sqrt(np.einsum("emk,emk->em", mixed, mixed))[..., None]
-        mixed[~known] = np.nan
-        return np.asarray(mixed)
+        steps_mm = self.layout.xy_mm[end] - self.layout.xy_mm[start]
+        return native.points_on_edges(markers, self.layout.edges, steps_mm, self.layout.virtual_per_edge)
 
 
 def _has_position(markers: Markers) -> NDArray[np.bool_]:
@@ -373,4 +383,5 @@ def appears_mirrored(view: View) -> bool:
 
 def _propagate_covariance(by_pose: Array, cov: Array) -> Array:
     """(N, 3, 3) covariances J C J^T for derivatives J (N, 3, 6 V) and the poses' covariance C (6 V, 6 V)."""
-    return np.asarray(by_pose @ cov @ np.swapaxes(by_pose, 1, 2))
+    weighted = (by_pose.reshape(-1, len(cov)) @ cov).reshape(by_pose.shape)
+    return np.asarray(weighted @ np.swapaxes(by_pose, 1, 2))

@@ -27,6 +27,9 @@ name = "gel_index"                         # what it is, mostly
 medium = [0.0, 0.004, 0.0, 0.0]            # gel_mm, gel_index, window_mm, window_index
 lens = [[0.02, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]   # of each view: focal_px, centre_px, distortion
 pose = [[0.0, 0.0, 0.0, 0.0, 0.0, 0.01]]   # of each view: turn (rad) and shift (mm) along the camera's axes
+
+[calibration.rig]                          # left out: the numbers hold for any pad
+layout_digest = "..."                      # of the layout.json of the pad that was calibrated
 """
 
 from __future__ import annotations
@@ -40,6 +43,7 @@ from typing import Any, NoReturn
 
 from extractor.errors import RigError
 from extractor.layout.json_fields import nearest_name, shown
+from extractor.layout.reference import Reference
 from extractor.layout.text_file import printable_path, read_text_file
 from extractor.space.camera import View, counts_text
 from extractor.space.lens import COUNTS
@@ -136,6 +140,7 @@ class Rig:
         views: the views.
         medium_deviation: standard deviations of the medium's numbers, by the fields of ``Medium``; absent: exact.
         deviations: what a calibration says instead, with lenses and poses.
+        layout_digest: of the pad that was calibrated; "": the rig holds for any pad.
 
     Raises:
         RigError: no view, two of one name, or a deviation of a number that the medium does not have.
@@ -144,6 +149,7 @@ class Rig:
     views: tuple[View, ...]
     medium_deviation: Mapping[str, float] = dataclasses.field(default_factory=dict)
     deviations: tuple[Deviation, ...] = ()
+    layout_digest: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "views", tuple(self.views))
@@ -174,6 +180,19 @@ class Rig:
             Deviation(name, tuple(value if field == name else 0.0 for field in MEDIUM_FIELDS))
             for name, value in self.medium_deviation.items()
         )
+
+    def require_layout(self, layout: Reference) -> None:
+        """Check that the rig was calibrated with this pad, as it is made or as it was designed.
+
+        Raises:
+            RigError: the calibration is older than the pad.
+        """
+        own = {layout.digest} if layout.as_made is None else {layout.digest, layout.as_made.of}
+        if self.layout_digest and self.layout_digest not in own:
+            raise RigError(
+                f"[calibration.rig] was made with the layout {self.layout_digest[:12]}, the layout here is "
+                f"{layout.digest[:12]}; repeat cmpdesign calibrate rig with this pad"
+            )
 
     def without_poses(self) -> Rig:
         """The same views without poses, which follow from a rest frame; ``mirrored`` is kept."""
@@ -241,7 +260,19 @@ def _parse_document(document: Mapping[str, Any]) -> Rig:
     medium = Medium(**_parse_medium_numbers(document["medium"], "medium")) if "medium" in document else None
     deviations = _parse_medium_numbers(document.get("medium_deviation", {}), "medium_deviation")
     views = tuple(_parse_view(table, index, medium) for index, table in enumerate(tables))
-    return Rig(views, deviations, _parse_deviations(document.get("deviation", [])))
+    return Rig(
+        views, deviations, _parse_deviations(document.get("deviation", [])), _parse_layout_digest(document)
+    )
+
+
+def _parse_layout_digest(document: Mapping[str, Any]) -> str:
+    table: object = document
+    for name in ("calibration", "rig"):
+        table = table.get(name) if isinstance(table, Mapping) else None
+    digest = table.get("layout_digest", "") if isinstance(table, Mapping) else ""
+    if not isinstance(digest, str) or not digest.isprintable():
+        _raise_rig_error("calibration.rig.layout_digest", shown(digest), "the digest of a layout.json")
+    return digest
 
 
 def _parse_deviations(tables: object) -> tuple[Deviation, ...]:

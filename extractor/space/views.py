@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from extractor.image.input import Channels
 from extractor.image.response import Response
 from extractor.layout.layout_file import LayoutLike, layout_of
 from extractor.layout.reference import Reference
+from extractor.numeric.threads import Threads, available_cores
 from extractor.pipeline import Extractor, Side, is_mirrored
 from extractor.presets import Preset
 from extractor.result import Markers
@@ -160,6 +162,8 @@ class ShapeTracker:
         warm: start from the previous frame where the image proves the prediction.
         preset, response, channels: see ``Extractor``. The views' poses determine the side that each view shows.
         contact: reads force, torque and regions of every frame; None: not wanted.
+        threads: in which the views are read at the same time, with the same bits for any number; None: one for each
+            view, at most one for each core.
 
     Raises:
         ValueError: no such preset, response or order of channels.
@@ -174,9 +178,12 @@ class ShapeTracker:
         response: Response | None = None,
         channels: Channels = "bgr",
         contact: ContactReader | None = None,
+        threads: int | None = None,
     ) -> None:
         self.reconstructor, self.contact = reconstructor, contact
         layout = reconstructor.layout
+        most = min(len(reconstructor.rig.views), available_cores()) if threads is None else threads
+        self._threads = Threads(most)
         sides = [_side_shown(layout, view, "designed") for view in reconstructor.poses.views]
         self._trackers = [
             Tracker(layout, warm=warm, preset=preset, response=response, side=side, channels=channels)
@@ -196,9 +203,11 @@ class ShapeTracker:
         started = time.perf_counter()
         rig = self.reconstructor.rig
         pictures = _images_by_view(image, rig)
-        tracked = tuple(
-            self._track_view(view, tracker, picture, time_s, reason)
-            for view, tracker, picture in zip(rig.views, self._trackers, pictures, strict=True)
+        tracked = self._threads.results(
+            [
+                partial(self._track_view, view, tracker, picture, time_s, reason)
+                for view, tracker, picture in zip(rig.views, self._trackers, pictures, strict=True)
+            ]
         )
         markers = [frame.markers if frame.status == FrameStatus.TRACKED else None for frame in tracked]
         shape = self.reconstructor.reconstruct(markers)
@@ -212,7 +221,7 @@ class ShapeTracker:
             status=FrameStatus(status),
             reason=_frame_reason(rig, tracked, shape, found),
             shape=shape,
-            views=tracked,
+            views=tuple(tracked),
             elapsed_ms=1e3 * (time.perf_counter() - started),
             contact=contact,
         )

@@ -7,16 +7,23 @@ from datetime import date
 from cmpdesign.calibration.rig.calibration import RigCalibration
 from cmpdesign.sensor.sensor_file import SensorFile
 from cmpdesign.sensor.toml_text import deviation_table, medium_table, replaced_tables, toml_table, view_table
+from extractor import Reference
 from extractor.space.rig import READ_TABLES
 
 
 def calibrated_text(
-    sensor: SensorFile, found: RigCalibration, pictures: int, steps_mm: tuple[float, ...], day: str | None
+    sensor: SensorFile,
+    found: RigCalibration,
+    layout: Reference,
+    pictures: int,
+    steps_mm: tuple[float, ...],
+    day: str | None,
 ) -> str:
     """The text of the sensor file with the calibrated rig, and [calibration.rig].
 
     Args:
         sensor: the measured file.
+        layout: the pad.
         pictures: their number, at rest.
         day: of the pictures, YYYY-MM-DD.
     """
@@ -28,6 +35,7 @@ def calibrated_text(
     tables += [deviation_table(one) for one in found.rig.deviations]
     record = {
         "date": date.fromisoformat(day) if day else None,
+        "layout_digest": layout.digest,
         "pictures": pictures,
         "steps_mm": steps_mm,
         "rms_px": tuple(found.rms_px.values()),

@@ -4,7 +4,7 @@ import { figures, h, number, toast } from "./base.js";
 import { design } from "./state.js";
 
 const STATUS = ["lost", "measured", "repaired from its neighbours", "fitted from its layer"];
-const STAGES = { seeds: "cells found", mesh: "cells joined", walk: "cells numbered", triangles: "inks named", number: "ids given", markers: "markers", residual: "what the drawing leaves" };
+const STAGES = { seeds: "cells found", mesh: "cells joined", walk: "cells numbered", triangles: "inks named", number: "ids given", markers: "markers", residual: "residuals" };
 
 const box = (title, ...content) => h("div", { class: "box" }, h("h2", {}, title), ...content);
 const verdict = (isGood, title, ...words) => h("div", { class: `finding ${isGood ? "good" : "error"}` }, h("b", { class: isGood ? "good" : "error" }, title), ...words);

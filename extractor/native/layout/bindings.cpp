@@ -1,6 +1,7 @@
 // Room "layout" for Python.
 #include "base/binding.hpp"
 
+#include "layout/covariance_couplings.hpp"
 #include "layout/lattice.hpp"
 #include "layout/lattice_tables.hpp"
 #include "layout/neighbour_tables.hpp"
@@ -16,6 +17,7 @@ void add_layout(nb::module_ module) {
   bind<&cells_at>(module, "cells_at", {"axial", "cell_lookup"});
   bind<&corner_ids>(module, "corner_ids", {"axial"});
   bind<&neighbour_ids>(module, "neighbour_ids", {"axial", "steps", "layers"});
+  bind<&covariance_couplings>(module, "covariance_couplings", {"couplings", "slopes", "gridlines"});
   bind<&scatter_bending>(module, "scatter_bending", {"ids", "weights", "normals", "spokes"});
 }
 

@@ -1,6 +1,7 @@
 // Room "space" for Python.
 #include "base/binding.hpp"
 
+#include "space/surface.hpp"
 #include "space/triangulation.hpp"
 
 namespace cmp {
@@ -120,6 +121,8 @@ void add_space(nb::module_ module) {
   bind<&linearise>(module, "linearise", {"view", "xyz_mm"});
   bind<&are_ahead>(module, "are_ahead", {"view", "xyz_mm"});
   bind<&rays>(module, "rays", {"view", "xy_px"});
+  bind<&gradients>(module, "gradients", {"weights", "around", "values"});
+  bind<&points_on_edges>(module, "points_on_edges", {"markers", "edges", "steps_mm", "count"});
   bind<&triangulate>(module, "triangulate", {"views", "xy_px", "cov_px2", "cov_pose", "gate"});
   bind<&inverses>(module, "inverses", {"normal"});
 }

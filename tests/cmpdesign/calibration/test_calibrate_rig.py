@@ -116,6 +116,7 @@ def test_a_sensor_is_calibrated_from_its_pictures(folder: Path, document: dict[s
     sensor = load_sensor_file(output)
     assert "# the first one" in sensor.text and sensor.layout == folder / "layout.json"
     assert sensor.table.calibration.rig is not None and sensor.table.calibration.rig.steps_mm == (0.3, 0.9)
+    assert sensor.rig.layout_digest == load_layout(sensor.layout).digest
     for view, true in zip(sensor.rig.views, cameras(), strict=True):
         np.testing.assert_allclose(view.R_camera_from_layout, true.R_camera_from_layout, atol=0.01)
     # the file is a rig: the depth of a press lies within what remains undetermined

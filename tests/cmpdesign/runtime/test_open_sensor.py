@@ -213,7 +213,10 @@ def test_zero_takes_the_mean_at_rest_and_refuses_a_touched_pattern(folder: Path,
 
 
 def test_health_says_what_has_changed_since_the_rest(folder: Path, plug: Plug) -> None:
-    """A scratched marker is learnt by ``zero``; dim or tinted light, a blur and a drift are told with their figures."""
+    """A scratched marker is learnt by ``zero``; dim or tinted light, a blur and a drift are told with their figures.
+
+    A recording has the new advice as events.
+    """
     clean = shot().image
     x, y = np.rint(shot().truth.marker_xy_px[40]).astype(int)
     scratched = clean.copy()
@@ -222,21 +225,22 @@ def test_health_says_what_has_changed_since_the_rest(folder: Path, plug: Plug) -
     plug(TimedCamera(lambda number: shown, FPS))
     with opened(folder / "thumb.toml") as sensors:
 
-        def health(image: Any) -> Any:
+        def health(image: Any, frames: int = 10) -> Any:
             nonlocal shown
             shown = image
             count = sensors.thumb.count
-            while sensors.thumb.count < count + 10:
+            while sensors.thumb.count < count + frames:
                 sensors.thumb.wait(after=sensors.thumb.results[-1].index)
             found = sensors.thumb.health
             advice = [one for one in found.advice if "frames have no result" not in one]  # a busy machine
             return replace(found, advice=tuple(advice))
 
         sensors.zero(check=False)
+        sensors.record(folder / "run.mcap")
         good = health(scratched)
         assert good.share_read == 1.0 and good.left_out == 3 and good.advice == ()
         assert good.light == pytest.approx(1, abs=0.01) and good.drift_px < 0.02
-        dim = health((0.5 * scratched).astype(np.uint8))
+        dim = health((0.5 * scratched).astype(np.uint8), 24)
         assert dim.light == pytest.approx(0.5, abs=0.02) and max(dim.tint) < 1.05
         assert any("has 50% of its brightness" in one or "has 49%" in one for one in dim.advice)
         tinted = health((scratched * (1.0, 0.8, 0.6)).astype(np.uint8))
@@ -252,6 +256,19 @@ def test_health_says_what_has_changed_since_the_rest(folder: Path, plug: Plug) -
         assert health(np.roll(scratched, 2, axis=1)).advice == ()
         bare = health(np.roll(clean, 2, axis=1))
         assert bare.left_out == good.left_out and bare.share_read == 1.0
+    told = [text for text in told_events(folder / "run.mcap") if "of its brightness at rest" in text]
+    assert len(told) == 1 and "check the light: the picture has" in told[0]
+    assert EventKind.HEALTH in {one.kind for one in sensors.thumb.events}
+
+
+def told_events(path: Path) -> list[str]:
+    """The events in the diagnostics of a recording, in the order of the results."""
+    return [
+        pair.value
+        for one in read_messages(path)["/diagnostics"]
+        for pair in one.decoded_message.status[0].values
+        if pair.key == "events"
+    ]
 
 
 def test_a_recording_of_running_sensors_has_their_gaps(folder: Path, plug: Plug, shots: list[Any]) -> None:
@@ -271,12 +288,7 @@ def test_a_recording_of_running_sensors_has_their_gaps(folder: Path, plug: Plug,
     counts = [len(messages[f"/{name}/markers"]) for name in ("thumb", "index")]
     assert sum(counts) == recording.frames == len(messages["/diagnostics"]) and min(counts) > 0
     assert recording.missed == 0
-    told = [
-        pair.value
-        for one in messages["/diagnostics"]
-        for pair in one.decoded_message.status[0].values
-        if pair.key == "events"
-    ]
+    told = told_events(path)
     assert any("frames again after" in text for text in told) and "" in told
     recording.close()
 
@@ -328,6 +340,9 @@ WRONG = {
     ("thumb.toml", "other.toml"): "camera '0' is used by",
     ("none.toml",): r"\[camera\] names no source",
     ("two.toml",): "names 2 cameras for 1",
+    (
+        "old.toml",
+    ): r"old.toml: \[calibration.rig\] was made with the layout 123456789abc, .* repeat cmpdesign calibrate rig",
 }
 
 
@@ -336,6 +351,9 @@ def test_files_that_cannot_be_used(names: tuple[str, ...], folder: Path) -> None
     write_sensor(folder / "other.toml", 0, FPS)
     write_sensor(folder / "none.toml", "", FPS)
     write_sensor(folder / "two.toml", "0,1", FPS)
+    write_sensor(folder / "old.toml", 0, FPS)
+    with (folder / "old.toml").open("a", encoding="utf-8") as file:
+        file.write('[calibration.rig]\nlayout_digest = "123456789abcdef"\n')
     with pytest.raises(SensorError, match=WRONG[names]):
         cmpdesign.open_sensor(*(folder / name for name in names))
     with pytest.raises(SensorError, match="shape needs two or more"):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from extractor import (
     Reason,
     Reconstructor,
     Rig,
+    RigError,
     Status,
     VirtualStatus,
     triangulate,
@@ -322,6 +325,13 @@ def test_mistakes_are_refused_by_name() -> None:
     ):
         with pytest.raises(PoseError, match=said):
             Reconstructor(LAYOUT, rig, seen)
+    as_made = SimpleNamespace(of=LAYOUT.digest, outlines_mm=None, covariance_mm2=None, cell_height_mm=0.0)
+    made = replace(LAYOUT, digest="2" * 64, as_made=cast(Any, as_made))
+    Rig(views, layout_digest=LAYOUT.digest).require_layout(made)
+    with pytest.raises(
+        RigError, match=r"made with the layout 222222222222, .* repeat cmpdesign calibrate rig"
+    ):
+        Reconstructor(LAYOUT, Rig(views, layout_digest=made.digest), rest)
     with pytest.raises(ValueError, match="markers of 1 views; the rig has 2"):
         Reconstructor(LAYOUT, Rig(views), rest).reconstruct(rest[:1])
 

@@ -85,7 +85,7 @@ def test_the_error_in_space_is_what_the_pixels_covariance_implies(mirror: bool) 
 
 
 def test_a_sequence_keeps_every_frame(plain: tuple[ViewExtractor, Reconstructor]) -> None:
-    tracker = ShapeTracker(plain[1])
+    tracker, alone = ShapeTracker(plain[1], threads=2), ShapeTracker(plain[1], threads=1)
 
     def deeper(k: int) -> Callable[[Array], Array]:
         return lambda xy: np.column_stack([xy, -0.3 * k * np.exp(-(xy**2).sum(axis=1) / 20)])
@@ -118,6 +118,10 @@ def test_a_sequence_keeps_every_frame(plain: tuple[ViewExtractor, Reconstructor]
     )
     assert not frames[0].reason and np.nanmin(frames[5].shape.displacement_mm[:, 2]) < -0.5
     assert np.isnan(frames[2].shape.xyz_mm).all()
+    for frame, image in zip(frames[:2], images, strict=False):  # the same bits on any number of threads
+        shape = alone.track(image).shape
+        np.testing.assert_array_equal(shape.xyz_mm, frame.shape.xyz_mm)
+        np.testing.assert_array_equal(shape.virtual_cov_mm2, frame.shape.virtual_cov_mm2)
 
 
 def test_one_image_a_view_is_plain_stereo() -> None:
@@ -185,8 +189,8 @@ def test_the_benchmark_runs_and_its_figures_hold(tmp_path: Path) -> None:
     root = Path(__file__).parents[3]
     run = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=600, check=False)
     assert run.returncode == 0, run.stderr
-    tables = json.loads(out.read_text(encoding="utf-8"))["tables"].values()
-    assert [len(rows) for rows in tables] == [8, 8]
+    *tables, times = json.loads(out.read_text(encoding="utf-8"))["tables"].values()
+    assert [len(rows) for rows in tables] == [8, 8] and len(times) == 6
     for r in (row for rows in tables for row in rows):
         assert r["reported"] > 0.95 and r["err/cov"] < 4
         if r["state"] in ("at rest", "ball 20 mm: press 0.5 mm"):
