@@ -104,7 +104,9 @@ def picture_of(layout: Layout, cells: list[SeenCell]) -> tuple[NDArray[np.uint8]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]}" height="{size[1]}">'
     png = resvg_py.svg_to_bytes(svg_string=head + "".join(shapes) + "</svg>", skip_system_fonts=True)
     fine = cv2.imdecode(np.frombuffer(bytes(png), np.uint8), cv2.IMREAD_COLOR)
-    light = np.where(fine <= 10, fine / 3294.6, ((fine / 255 + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    of = np.arange(256.0)
+    light_of = np.where(of <= 10, of / 3294.6, ((of / 255 + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    light = cv2.LUT(fine, light_of)
     light = cv2.GaussianBlur(cv2.resize(light, SIZE, interpolation=cv2.INTER_AREA), (0, 0), BLUR_PX)
     value = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0) ** (1 / 2.4) - 0.055)
     return np.rint(255 * np.clip(value, 0, 1)).astype(np.uint8), px_mm

@@ -8,6 +8,7 @@ is fitted, or held at 1.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,12 +151,11 @@ class EdgeModel:
         """The linear equations at a state."""
         edges, number = self._edges, self._edges.edge
         t = edges.distance_px - state.place_px[number]
-        share = _edge_share(t, state.blur_px, state.shape)
-        rise = (_edge_share(t + SHAPE_STEP, state.blur_px, state.shape) - share) / SHAPE_STEP
-        by_shape = [
-            (_edge_share(t, state.blur_px, state.shape + SHAPE_STEP * unit) - share) / SHAPE_STEP
-            for unit in np.eye(5)
-        ]
+        blur = _Blur(state.blur_px, state.shape)
+        rises = blur.rises(t)
+        share = blur.share(rises)
+        rise = (blur.share(blur.rises(t + SHAPE_STEP)) - share) / SHAPE_STEP
+        by_shape = [(each - share) / SHAPE_STEP for each in blur.shares_of_steps(t, rises)]
         gain = 1 + state.slope[number] * t
         sheet, excess = state.sheet[number], (state.opening - state.sheet)[number]
         light = np.clip(gain * (sheet + excess * share), 1e-3, 400.0)
@@ -218,8 +218,9 @@ class _System:
     def step(self, damping: float) -> _Step:
         """Solve the damped normal equations; the parameters of single edges are eliminated."""
         starts = np.searchsorted(self.edges.edge, np.arange(self.edges.count))
-        products = np.add.reduceat(self.matrix[:, :, None] * self.matrix[:, None], starts)
-        right = np.add.reduceat(self.matrix * self.residual[:, None], starts)
+        both = np.column_stack([self.matrix, self.residual])
+        sums = np.stack([edge.T @ edge for edge in np.split(both, starts[1:])])
+        products, right = sums[:, :-1, :-1], sums[:, :-1, -1]
         common = products[:, OWN:, OWN:].sum(axis=0)
         common[:5, :5] += np.diag(SHAPE_DEVIATION**-2.0)
         common_right = right[:, OWN:].sum(axis=0)
@@ -256,16 +257,36 @@ def _moved(state: EdgeState, step: _Step, free_exponent: bool) -> EdgeState:
     )
 
 
-def _edge_share(t: Values, blur_px: float, shape: Values) -> Values:
-    """(N,) the share of the opening's light at distances (N,) in px, of an edge of a shape (5,)."""
-    with extra("laser"):
-        from scipy.special import ndtr
+class _Blur:
+    """The blur of an edge of a shape (5,): the sum of three Gaussians over a pixel's box."""
 
-    widths = blur_px * np.exp(shape[0] + np.array([0.0, shape[3], shape[4]]))
-    parts = np.exp(np.array([0.0, shape[1], shape[2]]))
-    weights = (parts / parts.sum())[:, None] * PIXEL_WEIGHTS
-    rises = ndtr((t[:, None, None] + PIXEL_PLACES) / widths[:, None])
-    return np.asarray((rises * weights).sum(axis=(1, 2)))
+    def __init__(self, blur_px: float, shape: Values) -> None:
+        self._blur_px, self._shape = blur_px, shape
+        self._widths = blur_px * np.exp(shape[0] + np.array([0.0, shape[3], shape[4]]))
+        parts = np.exp(np.array([0.0, shape[1], shape[2]]))
+        self._weights = ((parts / parts.sum())[:, None] * PIXEL_WEIGHTS).ravel()
+
+    def rises(self, t: Values, gaussians: slice = slice(None)) -> Values:
+        """(N, 3, places) the shares of the opening's light at distances (N,) px, by Gaussian and place in the pixel."""
+        with extra("laser"):
+            from scipy.special import ndtr
+
+        return np.asarray(ndtr((t[:, None, None] + PIXEL_PLACES) / self._widths[gaussians, None]))
+
+    def share(self, rises: Values) -> Values:
+        """(N,) the share of the opening's light."""
+        return np.asarray(rises.reshape(len(rises), -1) @ self._weights)
+
+    def shares_of_steps(self, t: Values, rises: Values) -> Iterator[Values]:
+        """The shares (N,) after a step of each number of the shape; two change no width, two change one width."""
+        for number, unit in enumerate(np.eye(5)):
+            changed = _Blur(self._blur_px, self._shape + SHAPE_STEP * unit)
+            own = changed.rises(t) if number == 0 else rises
+            if number > 2:
+                own = rises.copy()
+                only = slice(number - 2, number - 1)
+                own[:, only] = changed.rises(t, only)
+            yield changed.share(own)
 
 
 def _edge_place(edges: EdgeValues, share: Values, number: int) -> float:

@@ -70,8 +70,11 @@ def decode_image(image: Image, light_of_value: Values, exponent: float = 1.0) ->
     values = np.arange(count) * (255.0 / (count - 1))
     light = np.interp(values, np.arange(256.0), light_of_value)
     table = (255.0 * (light / 255.0) ** exponent).astype(np.float32)
-    channels = [table[image[..., channel]] for channel in range(3)]
-    return np.asarray((channels[0] + channels[1] + channels[2]) / 3, dtype=np.float32)
+    channels = [np.take(table, image[..., channel], mode="clip") for channel in range(3)]
+    channels[0] += channels[1]
+    channels[0] += channels[2]
+    channels[0] /= 3
+    return channels[0]
 
 
 def eight_bit_gray(image: Image) -> NDArray[np.uint8]:

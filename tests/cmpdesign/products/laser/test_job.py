@@ -141,7 +141,7 @@ def test_a_fill_of_another_chemistry_is_warned_of(tmp_path: Path) -> None:
             ["laser.minimum_web_mm=2mm"],
             "smallest web of 1-red at the front: 1.35 mm, limit 2 mm; make pitch_mm larger",
         ),
-        (["layers=80", "pitch_mm=3"], "width of the job, on the bed: "),
+        (["layers=8", "pitch_mm=30"], "width of the job, on the bed: "),
         (["laser.x_mm=290"], "edge of the job beyond the bed's width: "),
         (["print_ids=true"], "a laser burns outlines only; leave print_ids out"),
         (["laser.taper_deg=6"], "the beam closes before the back"),
