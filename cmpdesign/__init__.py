@@ -1,6 +1,6 @@
 """Design, make and read multicolor continuous marker patterns (CMP) for vision-based tactile sensors.
 
-Every command has its call:
+Every command that ends by itself has its call:
 
     cmpdesign.init("mine"), build("mine.toml", "out"), check("mine.toml")
     design = cmpdesign.load("tac3d", layers=8)      a design; design.layout, design.check(), design.write("out")

@@ -1,7 +1,7 @@
 """The extractor: from an image to numbered markers, stage by stage. Every stage is timed.
 
 Stages: image, seeds, grow, mesh, light, walk, number, triangles, place, refine, repair, virtual, quality. A warm
-start of the tracker goes from image over predict and prove to refine.
+start of the tracker goes from image over prove to refine.
 """
 
 from __future__ import annotations
@@ -297,7 +297,7 @@ class ImageReader:
         stages.record("repair", repaired)
 
         def virtual() -> VirtualMarkers:
-            points = refined.points
+            points = refined.points[:, : layout.virtual_per_edge]
             if parallax is not None:
                 points = points_without_parallax(parallax, topology.edges, apparent.xy_px, points)
             return locate_virtual_markers(topology, repaired, points, refined.scatter)

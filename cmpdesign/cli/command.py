@@ -101,6 +101,13 @@ class Group(TyperGroup):
         _write_examples(self.epilog, formatter)
 
 
+def new_group(help_text: str, *shown: str) -> typer.Typer:
+    """A group of commands; ``shown`` are its examples."""
+    return typer.Typer(
+        cls=Group, epilog=examples(*shown), no_args_is_help=True, rich_markup_mode=None, help=help_text
+    )
+
+
 class OneLineErrors(Group):
     """Prints expected errors as one line on stderr with exit code 2, and Ctrl-C as one line with exit code 130.
 

@@ -24,7 +24,7 @@ from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
 from extractor.refine.estimate import RefinedMarkers
-from extractor.refine.refinement_step import extrapolate_pattern
+from extractor.refine.extrapolated_pattern import extrapolate_pattern
 from extractor.result import Status
 
 Points = NDArray[np.float64]

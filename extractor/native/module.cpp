@@ -34,7 +34,6 @@ void add_refine(nb::module_ module);
 void add_measure(nb::module_ module);
 void add_synthesis(nb::module_ module);
 void add_solve(nb::module_ module);
-void add_markers(nb::module_ module);
 }  // namespace cmp::refine
 
 namespace cmp::space {
@@ -57,7 +56,6 @@ NB_MODULE(_native, module) {
   cmp::refine::add_measure(module.def_submodule("measure"));
   cmp::refine::add_synthesis(module.def_submodule("synthesis"));
   cmp::refine::add_solve(module.def_submodule("solve"));
-  cmp::refine::add_markers(module.def_submodule("markers"));
   cmp::complete::add_complete(module.def_submodule("complete"));
   cmp::space::add_space(module.def_submodule("space"));
   cmp::track::add_track(module.def_submodule("track"));

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import measure
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
-from extractor.refine.measure.gridline_offsets import GridlineReading
-from extractor.refine.measure.marker_scatter import NO_SCATTER, MarkerScatter
+from extractor.refine.measure.marker_scatter import MarkerScatter
 from extractor.refine.relief import Parallax
 from extractor.refine.solve.fisher_information import Information
 from extractor.refine.synthesis.ink_levels import InkLevels, level_change
@@ -43,12 +44,12 @@ class Appearance(NamedTuple):
         """The appearance in another light.
 
         Args:
-            before, now: (2, C, 3) light of some cells over black, and of their black, in the previous and in the
+            before, now: (2, 3) mean light of some cells over black, and of their black, in the previous and in the
                 present image.
         """
-        gain = now[0].sum(axis=0) / np.maximum(before[0].sum(axis=0), 1e-9)
+        gain = now[0] / np.maximum(before[0], 1e-9)
         black = self.levels.black.copy()
-        black[:, 0] += (now[1] - before[1]).mean(axis=0)
+        black[:, 0] += now[1] - before[1]
         cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
         return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
 
@@ -56,6 +57,30 @@ class Appearance(NamedTuple):
         """Whether blur and levels are nearly the same."""
         blur = abs(self.sigma - other.sigma) < MAX_BLUR_CHANGE * other.sigma
         return blur and bool(level_change(other.levels.cell, self.levels.cell) < MAX_LEVEL_CHANGE)
+
+
+class GridlineReading(NamedTuple):
+    """The gridlines at the last comparison of the image with the pattern. Lengths are px at the scale of the step.
+
+    Attributes:
+        lines: (E, 8), as ``gridlines`` gives them.
+        contrasts: (E, 3) gray levels, differences of the values on both sides.
+        station_sums: (E, m, 2), of the pixels around each virtual marker, the weighted residual and the information.
+        weight: (E,) 0 to 1.
+        variance_ratio: (E,) of the variance along each gridline to that of noise.
+        dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
+        sigma: px, the blur.
+        noise: gray levels.
+    """
+
+    lines: NDArray[np.float64]
+    contrasts: NDArray[np.float64]
+    station_sums: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    variance_ratio: NDArray[np.float64]
+    dot_gain_offset: NDArray[np.float64]
+    sigma: float
+    noise: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +95,7 @@ class RefinedMarkers:
         blur_px: the blur found in the image, pixel included (sigma).
         noise: the noise found, gray levels, one channel.
         appearance: appearance of the image.
-        points: (E, m, 3) the virtual markers as measured, and their variance across the gridline, NaN where not
-            measured.
+        reading: the last comparison of the image with the pattern.
         scatter: of the markers, each by itself.
     """
 
@@ -81,8 +105,15 @@ class RefinedMarkers:
     blur_px: float
     noise: float
     appearance: Appearance
-    points: NDArray[np.float64]
+    reading: GridlineReading
     scatter: MarkerScatter
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """(E, m, 3) the virtual markers as measured, px, and their variance across the gridline, px^2, NaN where not
+        measured.
+        """
+        return measure.virtual_markers(self.reading, self.appearance.scale)
 
 
 class UnevenDotGain(NamedTuple):
@@ -95,56 +126,6 @@ class UnevenDotGain(NamedTuple):
 
     outward: float
     across: float
-
-
-EVEN = UnevenDotGain(0.0, 0.0)
-
-
-class Estimate(NamedTuple):
-    """The current estimate. Places are px in the image at the scale of the step. Compiled functions take a part of it.
-
-    Attributes:
-        xy: (M, 2) places at which the pattern is drawn. Markers that the image hardly shows or does not show
-            (``hidden``) lie at the places by the maps of their neighbours.
-        measured: (M, 2) all markers after the last step.
-        reliable: (M, 2) the same, NaN for markers that the image hardly shows.
-        hidden: (M,) bool.
-        maps: (M, 2, 5), as ``local_maps`` gives them.
-        sigma: the blur, px.
-        noise: gray levels, one channel.
-        levels: of the inks.
-        pixel_noise: as in ``Appearance``.
-        information: about the markers.
-        roughness: (M,) px^2, roughness of the markers around each marker.
-        bend_variance: (E,) px^2, variance of the gridlines' bending beyond the map.
-        bend: (E, 2) px, the bending.
-        weight: (E,) 0 to 1, of the gridlines in the last step; 1 before the first.
-        reading: gridlines and levels that the last step by synthesis compared with the image; None before the first.
-        dot_gain: distance by which the sides of all cells have moved outward, px.
-        uneven_dot_gain: its changes over the image.
-        scatter: of the markers, each by itself.
-        convergence_cov_px2: (M, 2, 2) covariance of the remaining error after the last step; None before it.
-    """
-
-    xy: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    reliable: NDArray[np.float64]
-    hidden: NDArray[np.bool_]
-    maps: NDArray[np.float64]
-    sigma: float
-    noise: float
-    levels: InkLevels
-    pixel_noise: float
-    information: Information
-    roughness: NDArray[np.float64]
-    bend_variance: NDArray[np.float64]
-    bend: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    reading: GridlineReading | None = None
-    dot_gain: float = 0.0
-    uneven_dot_gain: UnevenDotGain = EVEN
-    scatter: MarkerScatter = NO_SCATTER
-    convergence_cov_px2: NDArray[np.float64] | None = None
 
 
 class EdgeContrasts(NamedTuple):
@@ -161,6 +142,75 @@ class EdgeContrasts(NamedTuple):
     clearance: NDArray[np.float64]
 
 
-def places_in_view(view: PyramidLevel, places: InitialMarkers) -> InitialMarkers:
-    """Places of the full image in a reduced image."""
-    return places._replace(xy_px=view.to_level(places.xy_px), edge_px=places.edge_px / view.scale)
+class FirstEstimate(NamedTuple):
+    """The estimate of an image after the round of profiles. Places are px in the image at the scale of the round.
+
+    Attributes:
+        measured: (M, 2) all markers.
+        reliable: (M, 2) the same, NaN for markers that the image hardly shows.
+        bend: (E, 2) px, the bending of the gridlines.
+        information: about the markers.
+        weight: (E,) 0 to 1, of the gridlines.
+        sigma: the blur, px.
+        noise, pixel_noise, levels: as in ``Appearance``.
+        dot_gain: distance by which the sides of all cells have moved outward, px.
+        contrasts: across the gridlines.
+        places: the markers' places in the full image, outliers put where their neighbours predict them.
+    """
+
+    measured: NDArray[np.float64]
+    reliable: NDArray[np.float64]
+    bend: NDArray[np.float64]
+    information: Information
+    weight: NDArray[np.float64]
+    sigma: float
+    noise: float
+    pixel_noise: float
+    dot_gain: float
+    levels: InkLevels
+    contrasts: EdgeContrasts
+    places: InitialMarkers
+
+    def rescaled(self, old: PyramidLevel, view: PyramidLevel) -> FirstEstimate:
+        """The estimate of one level of an image in another level."""
+        ratio = old.scale / view.scale
+        # a pixel's own variance is a twelfth of its area
+        blur2 = (old.scale * self.sigma) ** 2 + (view.scale**2 - old.scale**2) / 12.0
+        shift = 0.5 * ratio - 0.5  # of a pixel's middle
+        blocks, clearance = self.information, self.contrasts.clearance.copy()
+        clearance[:, 0] *= ratio
+        return self._replace(
+            measured=ratio * self.measured + shift,
+            reliable=ratio * self.reliable + shift,
+            bend=ratio * self.bend,
+            information=Information(blocks.diagonal / ratio**2, blocks.off_diagonal / ratio**2),
+            sigma=max(float(np.sqrt(blur2)) / view.scale, measure.MIN_SIGMA_PX),
+            noise=max(ratio * self.noise, measure.MIN_NOISE),
+            pixel_noise=max(ratio * self.pixel_noise, measure.MIN_NOISE),
+            dot_gain=ratio * self.dot_gain,
+            levels=self.levels._replace(slope=self.levels.slope / ratio),
+            contrasts=self.contrasts._replace(clearance=clearance),
+        )
+
+
+class MeasuredImage(NamedTuple):
+    """The markers after the steps by synthesis, and what the image then shows.
+
+    Attributes:
+        xy_px, cov_px2, explained, reading: as in ``RefinedMarkers``.
+        sigma: the blur, px at the scale of the steps.
+        noise, pixel_noise, levels: as in ``Appearance``.
+        uneven_dot_gain: changes of the dot gain over the image.
+        scatter: of the markers, at the scale of the steps.
+    """
+
+    xy_px: NDArray[np.float64]
+    cov_px2: NDArray[np.float64]
+    explained: NDArray[np.bool_]
+    reading: GridlineReading
+    sigma: float
+    noise: float
+    pixel_noise: float
+    levels: InkLevels
+    uneven_dot_gain: UnevenDotGain
+    scatter: MarkerScatter

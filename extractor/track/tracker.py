@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import track as native
 from extractor.contact import ContactForce
 from extractor.errors import ImageError
 from extractor.image.input import Channels
@@ -22,10 +23,8 @@ from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edge
 from extractor.result import Markers, Origin, Reason, Status
 from extractor.track.displacement import Rest, fit_rest
-from extractor.track.image_check import check_cells, light_levels
-from extractor.track.ink_alignment import resting_shifts
-from extractor.track.warm_start import WarmStart, select_prediction, verify_prediction
-from extractor.track.warm_tables import WarmTables, build_warm_tables, predict_missing_markers
+from extractor.track.warm_start import SeenCells, TrackState, WarmStart, seen_cells
+from extractor.track.warm_tables import WarmTables, build_warm_tables
 
 MIN_KEPT_SHARE = 0.97  # of the markers of the last cold start; with fewer, a cold start may find more. Chosen
 WARM_EDGE_PX = 8.0  # edges at the scale of a warm start are this long, or up to twice; chosen
@@ -87,35 +86,6 @@ class Tracked:
         return f"<Tracked {self.index}: {self.status.name.lower()}, {self.markers}{reason}>"
 
 
-@dataclass(frozen=True, eq=False)
-class _TrackState:
-    """The last tracked frame, from which the next frame is predicted.
-
-    Attributes:
-        xy_px: (M, 2) float64, NaN where lost.
-        known: (M,) bool, the measured markers.
-        previous_px: (M, 2) float64, the markers of the previous frame; None where that frame was lost.
-        cell_levels: (2, C, 3) float64, see ``CellCheck``; complete.
-        cell_shift_px: (C, 2) float64, px at the scale of the next check, see ``resting_shifts``.
-        appearance: of the image, for refinement; None where no pattern was found.
-        mirrored: the image shows the pattern's back.
-        expected_count: largest number of measured markers since the last cold start.
-        frames_since_cold: number of frames since the last cold start.
-        is_before_gap: the frame after this one was lost.
-    """
-
-    xy_px: NDArray[np.float64]
-    known: NDArray[np.bool_]
-    previous_px: NDArray[np.float64] | None
-    cell_levels: NDArray[np.float64]
-    cell_shift_px: NDArray[np.float64]
-    appearance: Appearance | None
-    mirrored: bool
-    expected_count: int
-    frames_since_cold: int
-    is_before_gap: bool = False
-
-
 class Tracker:
     """Follows one pattern through a sequence of images of one size. A copy continues like the original.
 
@@ -154,7 +124,7 @@ class Tracker:
         self._mm_per_px = mm_per_px
         self._tables: WarmTables | None = build_warm_tables(layout) if warm else None
         self._sampled_edges = np.ascontiguousarray(layout.edges[::EDGE_SAMPLING_STEP])
-        self._state: _TrackState | None = None
+        self._state: TrackState | None = None
         self._size: tuple[int, ...] | None = None
         self._count = 0
         if rest is not None:
@@ -199,15 +169,13 @@ class Tracker:
             if (
                 self._state is not None
             ):  # the next frame may start from these positions, but not from velocities
-                self._state = replace(self._state, previous_px=None, is_before_gap=True)
+                self._state = self._state._replace(previous_px=None, is_before_gap=True)
             return markers, None
         if self._tables is not None and pyramid is not None:
-            check = check_cells(
-                pyramid.level(1).image, markers.xy_px[self._tables.corners], self._tables, None
-            )
-            _fill_unseen_levels(check.cell_levels, self._tables)
+            view = self._level_of_check(pyramid, markers.xy_px)
+            cells = seen_cells(pyramid.level(1), view, markers.xy_px, self._tables)
             count = int((markers.status == Status.MEASURED).sum())
-            self._update_state(pyramid, markers, appearance, check.cell_levels, count, 0)
+            self._update_state(markers, appearance, cells, count, 0)
             markers = self._settle(pyramid, markers)
         return markers, StartKind.COLD
 
@@ -222,7 +190,7 @@ class Tracker:
             if warm is None or cold is None or self._state is None:
                 break
             markers = warm[0]
-            self._state = replace(self._state, previous_px=cold.previous_px, frames_since_cold=0)
+            self._state = self._state._replace(previous_px=cold.previous_px, frames_since_cold=0)
         return markers
 
     def _try_warm_start(self, pyramid: Pyramid | None, stages: Stages) -> tuple[Markers, StartKind] | None:
@@ -232,22 +200,9 @@ class Tracker:
             return None
         if pyramid is None:
             return None
-        level = self._level_of_check(pyramid, state.xy_px)
-        candidates = [level.to_level(state.xy_px)]
-        if state.previous_px is not None:
-            moving = level.to_level(2 * state.xy_px - state.previous_px)
-            candidates.append(np.where(np.isfinite(moving), moving, candidates[0]))
-        predicted = stages.record(
-            "predict", select_prediction(level.image, candidates, tables, state.cell_levels)
-        )
-        if predicted is None:
-            return None
-        complete = predict_missing_markers(tables, predicted)
-        start = stages.record(
-            "prove",
-            verify_prediction(level, complete, state.known, tables, state.cell_levels, state.cell_shift_px),
-        )
-        return None if start is None else self._refine_warm_start(pyramid, state, start, stages)
+        view = self._level_of_check(pyramid, state.xy_px)
+        start = stages.record("prove", native.warm_start(view, state, tables))
+        return None if start is None else self._refine_warm_start(pyramid, start, stages)
 
     def _level_of_check(self, pyramid: Pyramid, xy_px: NDArray[np.float64]) -> PyramidLevel:
         """The image at the scale at which predictions are checked, for markers (M, 2), px."""
@@ -255,44 +210,43 @@ class Tracker:
         return pyramid.level(1 << max(int(np.log2(max(edge_px / WARM_EDGE_PX, 1.0))), 0))
 
     def _refine_warm_start(
-        self, pyramid: Pyramid, state: _TrackState, start: WarmStart, stages: Stages
+        self, pyramid: Pyramid, start: WarmStart, stages: Stages
     ) -> tuple[Markers, StartKind] | None:
         """The refined markers, moved by at most a quarter of an edge; None where too few of them are measured."""
+        state, tables = self._state, self._tables
+        assert state is not None and tables is not None
         numbered = NumberedMarkers(
             start.places, state.mirrored, Origin.PREVIOUS if start.by_rim else Origin.WHITE
         )
-        levels = (light_levels(own, pyramid.response) for own in (state.cell_levels, start.cell_levels))
-        before = state.appearance and state.appearance.with_lighting(*levels)
+        before = state.appearance and state.appearance.with_lighting(state.cells.light, start.light)
         markers, appearance = self._reader.finish(pyramid, numbered, stages, before)
         count = int((markers.status == Status.MEASURED).sum())
         if count < MIN_KEPT_SHARE * state.expected_count:
             return None
         expected, age = max(count, state.expected_count), state.frames_since_cold + 1
-        self._update_state(pyramid, markers, appearance, start.cell_levels, expected, age)
+        view = self._level_of_check(pyramid, markers.xy_px)
+        shift_px = native.resting_shifts(view, markers.xy_px, tables, start.levels)
+        cells = SeenCells(start.levels, start.light, shift_px)
+        self._update_state(markers, appearance, cells, expected, age)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
     def _update_state(
         self,
-        pyramid: Pyramid,
         markers: Markers,
         appearance: Appearance | None,
-        cell_levels: NDArray[np.float64],
+        cells: SeenCells,
         expected_count: int,
         frames_since_cold: int,
     ) -> None:
         last = self._state
-        assert self._tables is not None
         if appearance is not None and last is not None and last.appearance is not None:
             # cells above or below the black: the parallax of the first frame, also after a cold start
             appearance = appearance._replace(parallax=last.appearance.parallax)
-        level = self._level_of_check(pyramid, markers.xy_px)
-        at_rest = resting_shifts(level.image, level.to_level(markers.xy_px), self._tables, cell_levels)
-        self._state = _TrackState(
+        self._state = TrackState(
             xy_px=markers.xy_px,
             known=markers.status == Status.MEASURED,
             previous_px=last.xy_px if last is not None and not last.is_before_gap else None,
-            cell_levels=cell_levels,
-            cell_shift_px=at_rest,
+            cells=cells,
             appearance=appearance,
             mirrored=bool(markers.mirrored),
             expected_count=expected_count,
@@ -327,12 +281,3 @@ class Tracker:
         height, width = np.shape(image)[:2]
         assert self._size is not None
         return f"{width} x {height} px instead of {self._size[1]} x {self._size[0]} px"
-
-
-def _fill_unseen_levels(cell_levels: NDArray[np.float64], tables: WarmTables) -> None:
-    """Write the mean levels of an ink (2, C, 3) into its cells that were not seen."""
-    seen = np.isfinite(cell_levels[0, :, 0])
-    for ink in (1, 2, 3):
-        own = tables.ink == ink
-        mean = cell_levels[:, own & seen].mean(axis=1, keepdims=True) if (own & seen).any() else 0.0
-        cell_levels[:, own & ~seen] = mean

@@ -1,16 +1,7 @@
-"""The warm start: a frame's numbering is predicted from the previous frame, and proved by the image.
-
-The previous frame is no evidence. Every cell must show its own ink inside and none of it across its edges, and must be
-connected to the white cell (or to the whole rim of the pattern) over cells that pass the same test. A triangle that is
-off by more than a seventh of an edge fails. Therefore, where two passing triangles share a corner, the real cells share
-it, too. Around a real corner red, green and blue turn clockwise, so a chain of such cells from the white cell has the
-numbering of a cold start. Frames that fail have a cold start. The previous frame thus saves time and does not determine
-the numbering, except while the white cell is hidden and the whole rim is visible.
-"""
+"""What a frame leaves for the next one, and the warm start from it, which the image must prove."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,103 +10,74 @@ from numpy.typing import NDArray
 from extractor._native import track as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
-from extractor.track.image_check import CONFIRMED, check_cells
-from extractor.track.ink_alignment import align_to_inks
+from extractor.refine.estimate import Appearance
 from extractor.track.warm_tables import WarmTables
 
-# of the cells in view whose middles must show their ink under a predicted position; chosen
-MIN_PREDICTED = 0.8
-# of a cell's three edges across which it is bright, for the white cell and for a rival; chosen
-MIN_WHITE_EDGES = 2
+
+class SeenCells(NamedTuple):
+    """What a frame shows of its C colored cells.
+
+    Attributes:
+        levels: (2, C, 3) float64 BGR, each cell's ink level minus the black around the cell, and this black.
+        light: (2, 3) float64, the mean light of the cells over black, and of their black, 0 to 255.
+        shift_px: (C, 2) float64, px at the scale of the next check, from each cell's middle to the centroid of its ink;
+            0 where there is too little ink.
+    """
+
+    levels: NDArray[np.float64]
+    light: NDArray[np.float64]
+    shift_px: NDArray[np.float64]
 
 
-class VisibleCells(NamedTuple):
-    """Numbers of cells whose middles lie in the image, and of those whose middles match their own ink best."""
+class TrackState(NamedTuple):
+    """The last tracked frame, from which the next frame is predicted.
 
-    visible: int
-    matching: int
-
-
-class VerifiedMarkers(NamedTuple):
-    """The corners of proved cells, NaN elsewhere; ``agreed`` and ``is_intact`` as in ``InitialMarkers``."""
+    Attributes:
+        xy_px: (M, 2) float64, NaN where lost.
+        known: (M,) bool, the measured markers.
+        previous_px: (M, 2) float64, the markers of the previous frame; None where that frame was lost.
+        cells: as the frame shows them.
+        appearance: of the image, for refinement; None where no pattern was found.
+        mirrored: the image shows the pattern's back.
+        expected_count: largest number of measured markers since the last cold start.
+        frames_since_cold: number of frames since the last cold start.
+        is_before_gap: the frame after this one was lost.
+    """
 
     xy_px: NDArray[np.float64]
-    agreed: NDArray[np.bool_]
-    is_intact: NDArray[np.bool_]
+    known: NDArray[np.bool_]
+    previous_px: NDArray[np.float64] | None
+    cells: SeenCells
+    appearance: Appearance | None
+    mirrored: bool
+    expected_count: int
+    frames_since_cold: int
+    is_before_gap: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class WarmStart:
+class WarmStart(NamedTuple):
     """A proved warm start.
 
     Attributes:
         places: the markers before refinement.
-        cell_levels: (2, C, 3) as in ``CellCheck``; of cells that are not proved, the levels of the previous frame.
+        levels, light: as in ``SeenCells``; of cells that are not proved, the levels of the previous frame.
         by_rim: the white cell is hidden, and the rim proved the numbering.
     """
 
     places: InitialMarkers
-    cell_levels: NDArray[np.float64]
+    levels: NDArray[np.float64]
+    light: NDArray[np.float64]
     by_rim: bool
 
 
-def select_prediction(
-    image: NDArray[np.uint8],
-    candidates: list[NDArray[np.float64]],
-    tables: WarmTables,
-    levels_before: NDArray[np.float64],
-) -> NDArray[np.float64] | None:
-    """The candidate with the most cells that show their ink in their middle; None with too few cells.
+def seen_cells(
+    view: PyramidLevel, reduced: PyramidLevel, xy_px: NDArray[np.float64], tables: WarmTables
+) -> SeenCells:
+    """What an image shows of the cells of numbered markers. Cells that are not seen have the mean levels of their ink.
 
     Args:
-        image: (H, W, 3) uint8 BGR.
-        candidates: (M, 2) predicted markers each, px.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame.
+        view: the full image.
+        reduced: the same at the scale of the next check.
+        xy_px: (M, 2), NaN where lost.
     """
-    best, best_share = None, MIN_PREDICTED
-    for candidate in candidates:
-        cells = native.count_matching_centres(
-            np.ascontiguousarray(image), candidate, tables, levels_before[0]
-        )
-        if cells.matching > best_share * cells.visible:
-            best, best_share = candidate, cells.matching / cells.visible
-            if cells.matching == cells.visible:
-                break
-    return best
-
-
-def verify_prediction(
-    level: PyramidLevel,
-    predicted_px: NDArray[np.float64],
-    known: NDArray[np.bool_],
-    tables: WarmTables,
-    levels_before: NDArray[np.float64],
-    shift_before: NDArray[np.float64],
-) -> WarmStart | None:
-    """Move the predicted cells onto the image; None unless the image confirms enough cells.
-
-    Args:
-        level: the image at the scale of the check.
-        predicted_px: (M, 2) in this level, NaN where not predicted.
-        known: (M,) bool, markers of the previous frame; nearly all of their cells in view must be confirmed.
-        levels_before: (2, C, 3) ``CellCheck.cell_levels`` of the previous frame.
-        shift_before: (C, 2) px in this level, ``resting_shifts`` of the previous frame.
-    """
-    aligned = align_to_inks(level.image, predicted_px, tables, levels_before, shift_before)
-    check = check_cells(level.image, aligned.xy_px[tables.corners], tables, levels_before)
-    by_rim = check.white_count == 0
-    if check.white_elsewhere_count >= MIN_WHITE_EDGES:
-        return None
-    if by_rim and (check.verdict[tables.is_rim] != CONFIRMED).any():
-        return None
-    if not by_rim and (check.white_count < MIN_WHITE_EDGES or check.white_missing_count > 0):
-        return None
-    first = tables.is_rim if by_rim else tables.is_at_white
-    cells = tables.corners, tables.cells_of_marker
-    proved, enough = native.connected_cells(check.verdict, first, known, *cells)
-    if not enough:
-        return None
-    seen = native.verified_markers(aligned.xy_px, proved, tables.corners)
-    xy_px, edge_px = level.to_full_scale(seen.xy_px), aligned.edge_px * level.scale
-    places = InitialMarkers(xy_px, edge_px, seen.agreed, seen.is_intact)
-    return WarmStart(places, np.where(proved[:, None], check.cell_levels, levels_before), by_rim)
+    return native.seen_cells(view, reduced, xy_px, tables)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor._native import track as native
 from extractor.layout.reference import BLACK, WHITE, Reference
 from extractor.numeric.nearest_points import nearest_points
 
@@ -109,11 +108,3 @@ def _nearest_by_ink(centre_mm: NDArray[np.float64], ink: NDArray[np.uint8]) -> N
         members = np.flatnonzero(ink == color + 1)
         nearest[:, color] = members[nearest_points(centre_mm[members], centre_mm)[:, 0]]
     return nearest
-
-
-def predict_missing_markers(tables: WarmTables, xy_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The markers (M, 2) px; NaN markers are predicted from known cells across one of their edges.
-
-    A marker that several cells predict is placed at the mean of these places.
-    """
-    return native.predict_missing(tables.completion, tables.completion_weights, xy_px)

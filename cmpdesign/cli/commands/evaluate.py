@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from cmpdesign.api import workshop
-from cmpdesign.cli.command import Command, Group, examples
+from cmpdesign.cli.command import Command, examples, new_group
 from cmpdesign.cli.derived import derived
 from cmpdesign.cli.options.completions import COMPLETIONS
 from cmpdesign.cli.progress import working
@@ -18,16 +18,11 @@ from cmpdesign.errors import CmpDesignError
 from cmpdesign.evaluation.defaults import USUAL_TRIALS
 from cmpdesign.watch import watched
 
-app = typer.Typer(
-    cls=Group,
-    epilog=examples(
-        "cmpdesign evaluate precision -o quick --trials 1",
-        "cmpdesign evaluate designs tac3d digit -o compared",
-    ),
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    help="Repeat the article's experiments on a simulated sensor, and compare designs.\n\nWrites report.html and "
+app = new_group(
+    "Repeat the article's experiments on a simulated sensor, and compare designs.\n\nWrites report.html and "
     "report.json. The same command continues an interrupted run.",
+    "cmpdesign evaluate precision -o quick --trials 1",
+    "cmpdesign evaluate designs tac3d digit -o compared",
 )
 
 DesignsArgument = Annotated[

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import typer
-
 from cmpdesign.api import workshop
-from cmpdesign.cli.command import Command, Group, examples
+from cmpdesign.cli.command import Command, examples, new_group
 from cmpdesign.cli.derived import derived
 from cmpdesign.cli.terminal import print_warning, printable_path, say
 
@@ -22,13 +20,7 @@ ZARR = (
     "cmpdesign export zarr run1.npz run2.npz -o buffer.zarr",
     "cmpdesign export zarr run1.npz -o buffer.zarr --images frames",
 )
-app = typer.Typer(
-    cls=Group,
-    epilog=examples(LEROBOT[0], ZARR[0]),
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    help="Export runs as data sets for the training of policies.",
-)
+app = new_group("Export runs as data sets for the training of policies.", LEROBOT[0], ZARR[0])
 
 
 @app.command(cls=Command, epilog=examples(*LEROBOT))

@@ -9,6 +9,7 @@
 #include <nanobind/nanobind.h>
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -153,6 +154,15 @@ struct FromPython<T> {
   }
 };
 
+// A value that may be None.
+template <class T>
+struct FromPython<std::optional<T>> {
+  static std::optional<T> get(nb::handle object, const Name& name, Borrowed& borrowed) {
+    if (object.is_none()) return std::nullopt;
+    return FromPython<T>::get(object, name, borrowed);
+  }
+};
+
 // A record of numbers from a tuple or list of that length.
 template <class T, std::size_t N>
 struct FromPython<std::array<T, N>> {
@@ -208,6 +218,11 @@ nb::object to_python(T&& record) {
   return nb::steal(object);
 }
 
+template <class T>
+nb::object to_python(std::optional<T>&& value) {
+  return value ? to_python(std::move(*value)) : nb::none();
+}
+
 template <class... T>
 nb::object to_python(std::tuple<T...>&& values) {
   return std::apply([](auto&&... value) { return nb::make_tuple(to_python(std::move(value))...); },
@@ -241,6 +256,11 @@ struct TypeName<View<T, N>> {
 
 template <class T, int N>
 struct TypeName<Array<T, N>> : TypeName<View<T, N>> {};
+
+template <class T>
+struct TypeName<std::optional<T>> {
+  static std::string get() { return TypeName<T>::get() + " | None"; }
+};
 
 template <class T, std::size_t N>
 struct TypeName<std::array<T, N>> {
@@ -303,7 +323,7 @@ struct Bound<F, Result (*)(Arguments...)> {
         "def " + std::string(name) + "(" + parameters + ") -> " + TypeName<Result>::get();
     module.def(
         name, [names, all](Handle<G>... given) { return call(names, Given{given...}, all); },
-        nb::arg(names[G])..., nb::sig(signature.c_str()));
+        nb::arg(names[G]).none()..., nb::sig(signature.c_str()));
   }
 
   template <class T>

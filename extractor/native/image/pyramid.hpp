@@ -20,6 +20,9 @@ struct PyramidLevel {
   PolynomialFrame frame;              // the coordinates of polynomials over this image
   ResponseTables response;            // from values to light
 
+  // Points (N, 2) px of the full image in this one.
+  Array<double, 2> to_level(View<const double, 2> xy_px) const;
+
   CMP_RECORD("extractor.image.pyramid.PyramidLevel", image, scale, frame, response)
 };
 

@@ -62,9 +62,6 @@ struct SolvedMarkers {
   double noise, pixel_noise;                  // gray levels, one channel
   double dot_gain;                            // px
   View<const double, 3> convergence_cov_px2;  // (M, 2, 2) of the error that the last step left
-
-  CMP_RECORD("extractor.refine.estimate.Estimate", measured, reliable, information, bend_variance, weight,
-             noise, pixel_noise, dot_gain, convergence_cov_px2)
 };
 
 // The M markers after the tests.
@@ -73,8 +70,6 @@ struct FinalMarkers {
   Array<double, 3> cov_px2;   // (M, 2, 2) likewise
   Array<bool, 1> unaccepted;  // (M,)
   bool all_accepted;
-
-  CMP_RECORD("extractor.refine.acceptance.FinalMarkers", xy_px, cov_px2, unaccepted, all_accepted)
 };
 
 // Tests all markers. Where the drawing explains nothing well, markers far from their start are not accepted.

@@ -18,9 +18,6 @@ struct PatternState {
   double noise;                     // gray levels, one channel
   double dot_gain;                  // px
   MarkerScatter scatter;
-
-  CMP_RECORD("extractor.refine.estimate.Estimate", xy, hidden, maps, roughness, bend, weight, sigma, noise,
-             dot_gain, scatter)
 };
 
 // Markers before refinement.

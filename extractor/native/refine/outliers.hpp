@@ -1,4 +1,9 @@
 // Markers that contradict their neighbours: dirt that looks like a gridline has moved them.
+//
+// Two independent criteria must agree: the gridlines of the marker do not look like the pattern, and most
+// gridlines through the marker show that the map would be smooth if the marker were moved by one vector. The
+// marker then starts again from the moved place. Sharp bends, at the rim of an object or where it slips, give
+// vectors that differ from one gridline to the next.
 #pragma once
 
 #include <tuple>
@@ -40,8 +45,6 @@ struct MeasuredMarkers {
   View<const bool, 1> hidden;                // (M,)
   View<const double, 3> maps;                // (M, 2, 5) as local_maps gives them
   View<const double, 1> weight;              // (E,) of the gridlines in the step
-
-  CMP_RECORD("extractor.refine.estimate.Estimate", measured, reliable, hidden, maps, weight)
 };
 
 // Markers with outliers at their places; the arrays are empty if nothing was found.
@@ -49,9 +52,6 @@ struct CorrectedOutliers {
   bool found;
   Array<double, 2> measured, reliable, xy_px;  // (M, 2)
   Array<bool, 1> agreed, is_intact;            // (M,)
-
-  CMP_RECORD("extractor.refine.outliers.CorrectedOutliers", found, measured, reliable, xy_px, agreed,
-             is_intact)
 };
 
 // (M,), the markers whose gridlines with a positive weight (E,) have little profile_weight (E,); spokes (M,

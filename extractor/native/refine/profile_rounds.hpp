@@ -30,8 +30,6 @@ struct ProfileStep {
   Array<double, 1> weight;          // (E,) 0 to 1, with which it was used
   double dot_gain;                  // px
   StepSolution solution;
-
-  CMP_RECORD("extractor.refine.profile_rounds.ProfileStep", profile_weight, weight, dot_gain, solution)
 };
 
 // The measurements of a round of profiles, and the solution.

@@ -31,8 +31,6 @@ struct LostMarkers {
   View<const bool, 1> lost;  // (M,)
   View<double, 2> xy;   // (M, 2) px, written; NaN where a lost marker is not accepted, or far from its place
   View<double, 3> cov;  // (M, 2, 2) px^2, likewise
-
-  CMP_RECORD("extractor.refine.recovered_markers.LostMarkers", lost, xy, cov)
 };
 
 // Fills in the lost markers whose gridlines look like the pattern.

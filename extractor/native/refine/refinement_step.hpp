@@ -45,8 +45,6 @@ struct EliminatedBending {
 struct StepSolution {
   Array<double, 2> measured, reliable, bend;
   InformationArrays information;
-
-  CMP_RECORD("extractor.refine.refinement_step.StepSolution", measured, reliable, bend, information)
 };
 
 // The same with (E,) the ratio of the variance along each gridline to that of noise.
@@ -60,7 +58,7 @@ struct ExtrapolatedPattern {
   Array<bool, 1> hidden;  // (M,)
   Array<double, 3> maps;  // (M, 2, 5)
 
-  CMP_RECORD("extractor.refine.refinement_step.ExtrapolatedPattern", xy, hidden, maps)
+  CMP_RECORD("extractor.refine.extrapolated_pattern.ExtrapolatedPattern", xy, hidden, maps)
 };
 
 // The markers (M, 2) px, NaN where unknown, with those just beyond the known ones.
@@ -71,8 +69,6 @@ ExtrapolatedPattern extrapolate_pattern(View<const double, 2> xy, const layout::
 struct SteppedMarkers {
   View<const double, 2> measured, reliable;  // (M, 2) px; reliable: NaN where the image shows a marker little
   Information information;
-
-  CMP_RECORD("extractor.refine.estimate.Estimate", measured, reliable, information)
 };
 
 // The same with what bends its gridlines.
@@ -82,8 +78,6 @@ struct MovedPattern {
   Array<double, 3> maps;
   Array<double, 1> roughness;  // (M,) px^2
   MarkerScatter scatter;
-
-  CMP_RECORD("extractor.refine.refinement_step.MovedPattern", xy, hidden, maps, roughness, scatter)
 };
 
 // The pattern at the markers that a step left, and how its gridlines may bend.

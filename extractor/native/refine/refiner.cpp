@@ -2,30 +2,85 @@
 
 #include <cmath>
 
+#include "refine/measure/dot_gain.hpp"
+
 namespace cmp::refine {
 
-std::tuple<Array<double, 2>, Array<double, 3>> at_full_scale(View<const double, 2> xy,
-                                                             View<const double, 3> cov,
-                                                             const StartPlaces& places, double scale,
-                                                             const FullScaleLimits& limits) {
-  const auto start = places.xy_px;
+namespace {
+
+// Places of the full image in the reduced image, moved inward by the dot gain.
+numbering::InitialMarkers places_in_view(const image::PyramidLevel& view, const FirstEstimate& first,
+                                         View<const std::int32_t, 2> cells, const DotGainLimits& limits) {
+  const StartPlaces& places = first.places;
+  Array<double, 2> xy = view.to_level(places.xy_px);
+  if (first.dot_gain != 0.0) xy = markers_without_dot_gain(xy, cells, first.dot_gain, limits);
+  Array<double, 1> edge(places.edge_px);
+  for (double& own : edge) own /= static_cast<double>(view.scale);
+  return {std::move(xy), std::move(edge), Array<bool, 1>(places.agreed), Array<bool, 1>(places.is_intact)};
+}
+
+// The accepted markers; where the drawing does not explain the image, as in glare, the markers by many
+// profiles. `unaccepted` becomes those that the drawing does not explain.
+FinalMarkers accepted_or_recovered(const image::PyramidLevel& view, const layout::Topology& topology,
+                                   const FirstEstimate& first, const Estimate& after,
+                                   const StartPlaces& places, const RefinerLimits& limits) {
+  const StepSolution& solution = after.solution;
+  FinalMarkers out = accept_markers(
+      {solution.measured, solution.reliable, solution.information, after.bend_variance, after.reading.weight,
+       after.noise, first.pixel_noise, after.dot_gain, after.convergence_cov_px2},
+      places, topology, limits.final);
+  if (out.all_accepted) return out;
+  const auto [xy, hidden, maps] =
+      extrapolate_pattern(solution.reliable, topology, limits.steps.step.step.gridlines);
+  Array<bool, 1> lost = update_lost_markers(out.xy_px, out.cov_px2, out.unaccepted, xy, places.xy_px,
+                                            places.edge_px, limits.final.hidden);
+  fill_recovered_markers(view, after.state(xy, hidden, maps), first.contrasts, places, topology,
+                         {lost, out.xy_px, out.cov_px2}, limits.recovery);
+  out.unaccepted = std::move(lost);
+  return out;
+}
+
+// Turns markers of the reduced image into those of the full image; a lost one lies where its triangles agree.
+void update_to_full_scale(FinalMarkers& markers, const StartPlaces& places, double scale, double deviation) {
+  const auto out = markers.xy_px.view();
+  const auto out_cov = markers.cov_px2.view();
   const double area = scale * scale;
-  Array<double, 2> places_px(xy.shape());
-  Array<double, 3> covariances(cov.shape());
-  const auto out = places_px.view();
-  const auto out_cov = covariances.view();
-  for (Index m = 0; m < xy.size(); ++m) {
-    const bool from_places = std::isnan(xy(m, 0)) && places.agreed[m] && std::isfinite(start(m, 0));
+  for (Index m = 0; m < out.size(); ++m) {
+    const bool from_places = std::isnan(out(m, 0)) && places.agreed[m] && std::isfinite(places.xy_px(m, 0));
     for (Index axis = 0; axis < 2; ++axis) {
-      out(m, axis) = ((from_places ? start(m, axis) : xy(m, axis)) + 0.5) * scale - 0.5;
-      for (Index other = 0; other < 2; ++other) out_cov(m, axis, other) = area * cov(m, axis, other);
+      out(m, axis) = ((from_places ? places.xy_px(m, axis) : out(m, axis)) + 0.5) * scale - 0.5;
+      for (Index other = 0; other < 2; ++other) out_cov(m, axis, other) *= area;
     }
     if (!from_places) continue;
-    const double deviation = limits.agreed_deviation * places.edge_px[m];
-    out_cov(m, 0, 0) = out_cov(m, 1, 1) = area * (deviation * deviation);
+    const double own = deviation * places.edge_px[m];
+    out_cov(m, 0, 0) = out_cov(m, 1, 1) = area * (own * own);
     out_cov(m, 0, 1) = out_cov(m, 1, 0) = 0.0;
   }
-  return {std::move(places_px), std::move(covariances)};
+}
+
+}  // namespace
+
+MeasuredImage measure_image(const image::PyramidLevel& view, const layout::Topology& topology,
+                            const FirstEstimate& first, double small_remainder, Index stations,
+                            const RefinerLimits& limits) {
+  const auto scale = static_cast<double>(view.scale);
+  const numbering::InitialMarkers own =
+      places_in_view(view, first, topology.cells, limits.steps.step.dot_gain);
+  const StartPlaces places{own.xy_px, own.edge_px, own.agreed, own.is_intact};
+  Estimate after = synthesis_steps(view, topology, first, small_remainder, stations, limits.steps);
+  FinalMarkers markers = accepted_or_recovered(view, topology, first, after, places, limits);
+  update_to_full_scale(markers, places, scale, limits.agreed_deviation);
+  for (bool& explained : markers.unaccepted) explained = !explained;
+  return {std::move(markers.xy_px),
+          std::move(markers.cov_px2),
+          std::move(markers.unaccepted),
+          std::move(after.reading),
+          after.sigma,
+          after.noise,
+          first.pixel_noise,
+          std::move(after.levels),
+          after.uneven_dot_gain,
+          after.drawn.scatter};
 }
 
 }  // namespace cmp::refine

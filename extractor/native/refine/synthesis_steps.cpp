@@ -1,10 +1,42 @@
 #include "refine/synthesis_steps.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "refine/synthesis/residual_kernel.hpp"
 
 namespace cmp::refine {
+
+namespace {
+
+// The thread's memory for the drawing of an image of a shape (H, W, 3). Outside the box that a step draws it
+// keeps numbers of earlier drawings.
+View<float, 3> kept_picture(std::array<Index, 3> shape) {
+  static thread_local std::vector<float> memory;
+  const auto size = static_cast<std::size_t>(shape[0] * shape[1] * shape[2]);
+  if (memory.size() < size) memory.resize(size);
+  return {memory.data(), shape};
+}
+
+// Whether the next drawing would differ from the last one by small moves of the markers only. Blur or dot
+// gain that has changed, bending that was not drawn, and markers that scatter are drawn otherwise.
+bool is_settled(const PatternState& before, const Estimate& after, const SynthesisStep& step,
+                const layout::Topology& topology, const StepsLimits& limits) {
+  const double change_px = std::abs(step.sigma - before.sigma) + std::abs(step.dot_gain - before.dot_gain);
+  if (change_px >= limits.small_change * before.sigma) return false;
+  const auto& diagonal = step.solution.information.diagonal;
+  const auto bend = before.bend.flat();
+  const bool is_bent = std::any_of(bend.begin(), bend.end(), [](double own) { return own != 0.0; });
+  if (!is_bent && typical_bending(step.solution.bend, step.is_read, diagonal) >= limits.small_bend)
+    return false;
+  const auto scatter =
+      measure_scatter(step.solution.reliable, after.drawn.maps, diagonal, topology, limits.step.step.scatter);
+  return scatter.variance_px2 == 0.0 && scatter.share == 0.0;
+}
+
+}  // namespace
 
 SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topology& topology,
                              View<float, 3> picture, const PatternState& state, const InkLevels& levels,
@@ -44,7 +76,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
   LevelArrays after = levels_at_blur(levels_of(corrected), state.xy, topology.cells, topology.cell_color,
                                      sigma, blur_px, limits.drawing.bleed);
   ReadGridlines reading{std::move(lines),
-                        std::move(sides),
+                        std::move(contrasts),
                         std::move(read.stations),
                         std::move(weighed.weight),
                         std::move(solved.variance_ratio),
@@ -60,6 +92,44 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
           std::move(after),
           std::move(is_read),
           edge_px};
+}
+
+Estimate synthesis_steps(const image::PyramidLevel& view, const layout::Topology& topology,
+                         const FirstEstimate& first, double small_remainder, Index stations,
+                         const StepsLimits& limits) {
+  const View<float, 3> picture = kept_picture(view.image.shape());
+  Array<double, 2> shift(first.measured.shape(), std::numeric_limits<double>::quiet_NaN());
+  SteppedMarkers markers{first.measured, first.reliable, first.information};
+  View<const double, 2> bend = first.bend;
+  View<const double, 1> weight = first.weight;
+  InkLevels levels = first.levels;
+  double sigma = first.sigma, noise = first.noise, dot_gain = first.dot_gain;
+  Estimate out;
+  for (Index n = 0; n < limits.max_steps; ++n) {
+    MovedPattern drawn = move_pattern(markers, topology, limits.step.step);
+    const PatternState state{drawn.xy, drawn.hidden, drawn.maps, drawn.roughness, bend,
+                             weight,   sigma,        noise,      dot_gain,        drawn.scatter};
+    SynthesisStep step = synthesis_step(view, topology, picture, state, levels, stations, limits.step);
+    const double ratio = sigma / step.edge_px;
+    StepRemainder rest = step_remainder(step.solution.measured, drawn.xy, shift, sigma,
+                                        limits.blur_remainder * (ratio * ratio),
+                                        step.solution.information.diagonal, limits.convergence);
+    shift = std::move(rest.shift);
+    out.drawn = std::move(drawn);
+    const bool is_last = rest.error < small_remainder && is_settled(state, out, step, topology, limits);
+    out.solution = std::move(step.solution);
+    out.bend_variance = std::move(step.bend_variance);
+    out.reading = std::move(step.reading);
+    out.sigma = step.sigma, out.noise = out.reading.noise, out.dot_gain = step.dot_gain;
+    out.uneven_dot_gain = step.uneven_dot_gain;
+    out.levels = std::move(step.levels);
+    out.convergence_cov_px2 = std::move(rest.cov_px2);
+    if (is_last) break;
+    markers = {out.solution.measured, out.solution.reliable, out.solution.information};
+    bend = out.solution.bend, weight = out.reading.weight, levels = levels_of(out.levels);
+    sigma = out.sigma, noise = out.noise, dot_gain = out.dot_gain;
+  }
+  return out;
 }
 
 }  // namespace cmp::refine

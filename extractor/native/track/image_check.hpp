@@ -9,7 +9,7 @@
 
 namespace cmp::track {
 
-// Verdicts on a cell; twins of the constants in extractor/track/image_check.py.
+// Verdicts on a cell.
 inline constexpr std::uint8_t UNSEEN = 0, CONTRADICTED = 1, CONFIRMED = 2;
 
 // Limits of the check.
@@ -38,9 +38,6 @@ struct CellCheck {
   Array<double, 3> cell_levels;    // (2, C, 3)
   // edges across which the white cell is bright, is not bright, and a black cell is as bright as white
   std::int64_t white_count, white_missing_count, white_elsewhere_count;
-
-  CMP_RECORD("extractor.track.image_check.CellCheck", verdict, cell_levels, white_count, white_missing_count,
-             white_elsewhere_count)
 };
 
 // The check of the cells with the corners xy (C, 3, 2), NaN where not predicted.

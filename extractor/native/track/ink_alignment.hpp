@@ -29,8 +29,6 @@ struct AlignedMarkers {
   Array<double, 2> xy_px;    // (M, 2), NaN where the shifts of the cells disagree or are unknown
   double max_shift;          // the largest shift, in edges
   Array<double, 1> edge_px;  // (M,) px, the mean edges of the cells at each marker
-
-  CMP_RECORD("extractor.track.ink_alignment.AlignedMarkers", xy_px, max_shift, edge_px)
 };
 
 // (C, 2) px from each cell's predicted middle to the centroid of its ink nearby, NaN where there is too

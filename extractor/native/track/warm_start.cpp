@@ -33,8 +33,12 @@ bool has_own_ink(const std::array<double, 3>& color, Index i, const WarmTables& 
   return best == tables.ink[i] && best_score > min_strength * norm(levels[i]);
 }
 
-}  // namespace
+// The cells of a layout whose middles lie in the image.
+struct VisibleCells {
+  std::int64_t visible, matching;  // the latter match their own ink better than the two others
+};
 
+// image (H, W, 3) BGR; xy (M, 2) markers, NaN where not predicted; levels (C, 3) ink levels over black.
 VisibleCells count_matching_centres(View<const std::uint8_t, 3> image, View<const double, 2> xy,
                                     const WarmTables& tables, View<const double, 2> levels,
                                     const WarmStartLimits& limits) {
@@ -55,11 +59,18 @@ VisibleCells count_matching_centres(View<const std::uint8_t, 3> image, View<cons
   return {visible, matching};
 }
 
-std::tuple<Array<bool, 1>, bool> connected_cells(View<const std::uint8_t, 1> verdict,
-                                                 View<const bool, 1> first, View<const bool, 1> known,
-                                                 View<const std::int32_t, 2> corners,
-                                                 View<const std::int32_t, 2> cells_of_marker,
-                                                 const WarmStartLimits& limits) {
+// The cells (C,) that the image proves, and whether they are enough.
+struct ProvedCells {
+  Array<bool, 1> proved;
+  bool is_enough;
+};
+
+// The confirmed cells that are connected to the first ones (C,) over common markers; they are enough if they
+// are nearly all of the cells in view whose markers were known (M,).
+ProvedCells connected_cells(View<const std::uint8_t, 1> verdict, View<const bool, 1> first,
+                            View<const bool, 1> known, const WarmTables& tables,
+                            const WarmStartLimits& limits) {
+  const auto corners = tables.corners, cells_of_marker = tables.cells_of_marker;
   Array<bool, 1> reached({corners.size()});
   std::vector<Index> queue;
   queue.reserve(static_cast<std::size_t>(corners.size()));
@@ -87,9 +98,11 @@ std::tuple<Array<bool, 1>, bool> connected_cells(View<const std::uint8_t, 1> ver
   return {std::move(reached), !queue.empty() && static_cast<double>(found) >= least};
 }
 
-VerifiedMarkers verified_markers(View<const double, 2> xy, View<const bool, 1> proved,
-                                 View<const std::int32_t, 2> corners) {
-  const Index count = xy.size();
+// The corners of the proved cells (C,) in the full image; aligned, in the view.
+numbering::InitialMarkers verified_markers(const image::PyramidLevel& view, const AlignedMarkers& aligned,
+                                           View<const bool, 1> proved, View<const std::int32_t, 2> corners) {
+  const auto scale = static_cast<double>(view.scale);
+  const Index count = aligned.xy_px.size();
   Array<double, 2> kept({count, 2}, std::numeric_limits<double>::quiet_NaN());
   Array<std::int64_t, 1> verified_count({count}, 0), cell_count({count}, 0);
   for (Index i = 0; i < corners.size(); ++i) {
@@ -97,7 +110,7 @@ VerifiedMarkers verified_markers(View<const double, 2> xy, View<const bool, 1> p
       cell_count[m] += 1;
       if (!proved[i]) continue;
       verified_count[m] += 1;
-      copy<double, 1>(xy[m], kept[m]);
+      for (Index axis = 0; axis < 2; ++axis) kept(m, axis) = (aligned.xy_px(m, axis) + 0.5) * scale - 0.5;
     }
   }
   Array<bool, 1> agreed({count}), is_intact({count});
@@ -106,7 +119,98 @@ VerifiedMarkers verified_markers(View<const double, 2> xy, View<const bool, 1> p
     agreed[m] = agreement.agreed;
     is_intact[m] = agreement.is_intact;
   }
-  return {std::move(kept), std::move(agreed), std::move(is_intact)};
+  Array<double, 1> edge(aligned.edge_px.view());
+  for (double& own : edge) own *= scale;
+  return {std::move(kept), std::move(edge), std::move(agreed), std::move(is_intact)};
+}
+
+// The prediction, px in the view, under which most cells show their ink in their middle: the markers where
+// they were, or moved as from the frame before; nothing with too few cells.
+std::optional<Array<double, 2>> best_prediction(const image::PyramidLevel& view, const TrackState& state,
+                                                const WarmTables& tables, const WarmStartLimits& limits) {
+  std::vector<Array<double, 2>> candidates;
+  candidates.push_back(view.to_level(state.xy_px));
+  if (state.previous_px) {
+    Array<double, 2> moving(state.xy_px);
+    for (Index m = 0; m < moving.size(); ++m) {
+      for (Index axis = 0; axis < 2; ++axis) {
+        const double next = 2.0 * state.xy_px(m, axis) - (*state.previous_px)(m, axis);
+        if (std::isfinite(next)) moving(m, axis) = next;
+      }
+    }
+    candidates.push_back(view.to_level(moving));
+  }
+  std::optional<Array<double, 2>> best;
+  double best_share = limits.min_predicted_share;
+  for (auto& candidate : candidates) {
+    const auto cells = count_matching_centres(view.image, candidate, tables, state.cells.levels[0], limits);
+    const auto visible = static_cast<double>(cells.visible), matching = static_cast<double>(cells.matching);
+    if (!(matching > best_share * visible)) continue;
+    best = std::move(candidate), best_share = matching / visible;
+    if (cells.matching == cells.visible) break;
+  }
+  return best;
+}
+
+// The markers (M, 2) moved to the places of their cells' inks, in at most two passes.
+//
+// Blur, encoding and the choice of pixels shift centroids by a tenth of a pixel, equally in equal frames.
+// Therefore the shift of a cell that rests is the difference from the shift in the previous frame at its own
+// markers.
+AlignedMarkers align_to_inks(View<const std::uint8_t, 3> image, const Array<double, 2>& predicted,
+                             const SeenCells& before, const WarmTables& tables,
+                             const WarmStartLimits& limits) {
+  AlignedMarkers aligned{Array<double, 2>(predicted.view()), 0.0, {}};
+  for (int pass = 0; pass < 2; ++pass) {
+    const Array<double, 2> at = std::move(aligned.xy_px);
+    Array<double, 2> shift = measure_shifts(image, at, tables, before.levels, limits.cells.alignment);
+    for (Index i = 0; i < shift.size(); ++i) {
+      const auto start = at[tables.corners(i, 0)], end = at[tables.corners(i, 1)];
+      const double edge = limits.resting_shift * std::hypot(end[0] - start[0], end[1] - start[1]);
+      const double x = shift(i, 0) - before.shift_px(i, 0), y = shift(i, 1) - before.shift_px(i, 1);
+      if (std::hypot(x, y) < edge) shift(i, 0) = x, shift(i, 1) = y;
+    }
+    aligned = update_shifts_and_move_markers(at, shift, tables.corners, limits.cells.alignment);
+    if (aligned.max_shift < limits.large_shift) break;
+  }
+  return aligned;
+}
+
+// Whether the white cell is where the layout has it, and nowhere else; where it is hidden, whether the whole
+// rim is confirmed.
+bool is_white_right(const CellCheck& check, View<const bool, 1> is_rim, const WarmStartLimits& limits) {
+  if (check.white_elsewhere_count >= limits.min_white_edges) return false;
+  if (check.white_count > 0)
+    return check.white_count >= limits.min_white_edges && check.white_missing_count == 0;
+  for (Index i = 0; i < is_rim.size(); ++i) {
+    if (is_rim[i] && check.verdict[i] != CONFIRMED) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<WarmStart> warm_start(const image::PyramidLevel& view, const TrackState& state,
+                                    const WarmTables& tables, const WarmStartLimits& limits) {
+  const auto predicted = best_prediction(view, state, tables, limits);
+  if (!predicted) return std::nullopt;
+  const AlignedMarkers aligned =
+      align_to_inks(view.image, predict_missing(tables, *predicted), state.cells, tables, limits);
+  const Array<double, 3> corners = corners_at(aligned.xy_px, tables.corners);
+  CellCheck check = check_cells(view.image, corners, tables, state.cells.levels[0], true, limits.cells.check);
+  if (!is_white_right(check, tables.is_rim, limits)) return std::nullopt;
+  const bool by_rim = check.white_count == 0;
+  const auto first = by_rim ? tables.is_rim : tables.is_at_white;
+  const auto [proved, is_enough] = connected_cells(check.verdict, first, state.known, tables, limits);
+  if (!is_enough) return std::nullopt;
+  for (Index kind = 0; kind < 2; ++kind) {
+    for (Index i = 0; i < proved.size(); ++i) {
+      if (!proved[i]) copy<double, 1>(state.cells.levels[kind][i], check.cell_levels[kind][i]);
+    }
+  }
+  Array<double, 2> light = mean_light(check.cell_levels, view.response.light);
+  return WarmStart{verified_markers(view, aligned, proved, tables.corners), std::move(check.cell_levels),
+                   std::move(light), by_rim};
 }
 
 }  // namespace cmp::track

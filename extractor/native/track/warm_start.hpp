@@ -1,9 +1,20 @@
 // The warm start: a frame's numbering is predicted from the previous frame, and proved by the image.
+//
+// The previous frame is no evidence. Every cell must show its own ink inside and none of it across its edges,
+// and must be connected to the white cell (or to the whole rim of the pattern) over cells that pass the same
+// test. A triangle that is off by more than a seventh of an edge fails. Therefore, where two passing
+// triangles share a corner, the real cells share it, too. Around a real corner red, green and blue turn
+// clockwise, so a chain of such cells from the white cell has the numbering of a cold start. Frames that fail
+// have a cold start. The previous frame thus saves time and does not determine the numbering, except while
+// the white cell is hidden and the whole rim is visible.
 #pragma once
 
-#include <tuple>
+#include <optional>
 
 #include "base/array.hpp"
+#include "image/pyramid.hpp"
+#include "numbering/marker_places.hpp"
+#include "track/seen_cells.hpp"
 #include "track/warm_tables.hpp"
 
 namespace cmp::track {
@@ -13,40 +24,40 @@ struct WarmStartLimits {
   double centre_radius_px = 0.5;  // of the disc over which a middle's color is averaged. Chosen.
   // of a middle's ink level, relative to the frame before, for the middle to show its ink. Chosen.
   double min_centre_strength = 0.3;
+  // of the cells in view, whose middles must show their ink under a predicted position. Chosen.
+  double min_predicted_share = 0.8;
   double min_verified_share = 0.95;  // of the cells in view that the image must confirm. Chosen.
+  // in edges; after a larger shift the window is moved and the shift measured again. Chosen.
+  double large_shift = 0.2;
+  // of a cell from the frame before, in edges, up to which the cell rests. Chosen.
+  double resting_shift = 0.02;
+  // of a cell's three edges across which it is bright, for the white cell and for a rival. Chosen.
+  std::int64_t min_white_edges = 2;
+  CellLimits cells;
 };
 
-struct VerifiedMarkers {
-  Array<double, 2> xy_px;            // (M, 2), NaN where no proved cell has a corner
-  Array<bool, 1> agreed, is_intact;  // (M,) as in InitialMarkers
+// The last frame; the Python class explains the fields.
+struct TrackState {
+  View<const double, 2> xy_px;  // (M, 2)
+  View<const bool, 1> known;    // (M,)
+  std::optional<View<const double, 2>> previous_px;
+  SeenCells cells;
 
-  CMP_RECORD("extractor.track.warm_start.VerifiedMarkers", xy_px, agreed, is_intact)
+  CMP_RECORD("extractor.track.warm_start.TrackState", xy_px, known, previous_px, cells)
 };
 
-// The cells of a layout whose middles lie in the image.
-struct VisibleCells {
-  std::int64_t visible, matching;  // the latter match their own ink better than the two others
+// A proved start; the Python class explains the fields.
+struct WarmStart {
+  numbering::InitialMarkers places;
+  Array<double, 3> levels;
+  Array<double, 2> light;
+  bool by_rim;
 
-  CMP_RECORD("extractor.track.warm_start.VisibleCells", visible, matching)
+  CMP_RECORD("extractor.track.warm_start.WarmStart", places, levels, light, by_rim)
 };
 
-// image (H, W, 3) BGR; xy (M, 2) markers, NaN where not predicted; levels (C, 3) ink levels over black.
-VisibleCells count_matching_centres(View<const std::uint8_t, 3> image, View<const double, 2> xy,
-                                    const WarmTables& tables, View<const double, 2> levels,
-                                    const WarmStartLimits& limits);
-
-// (C,) the confirmed cells that are connected to the first ones (C,) over common markers; and whether they
-// are nearly all of the cells in view whose markers were known (M,).
-//
-// verdict (C,), corners (C, 3), cells_of_marker (M, 3) as in CellCheck and WarmTables.
-std::tuple<Array<bool, 1>, bool> connected_cells(View<const std::uint8_t, 1> verdict,
-                                                 View<const bool, 1> first, View<const bool, 1> known,
-                                                 View<const std::int32_t, 2> corners,
-                                                 View<const std::int32_t, 2> cells_of_marker,
-                                                 const WarmStartLimits& limits);
-
-// The corners of the cells proved (C,); xy (M, 2), corners (C, 3).
-VerifiedMarkers verified_markers(View<const double, 2> xy, View<const bool, 1> proved,
-                                 View<const std::int32_t, 2> corners);
+// The start from the last frame, in an image at the scale of the check; nothing where it does not prove one.
+std::optional<WarmStart> warm_start(const image::PyramidLevel& view, const TrackState& state,
+                                    const WarmTables& tables, const WarmStartLimits& limits);
 
 }  // namespace cmp::track

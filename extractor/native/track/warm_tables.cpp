@@ -4,12 +4,18 @@
 
 namespace cmp::track {
 
-Array<double, 2> predict_missing(View<const std::int32_t, 2> completion, View<const double, 2> weights,
-                                 View<const double, 2> xy) {
-  Array<double, 2> out(xy.shape());
-  for (Index m = 0; m < xy.size(); ++m) {
-    for (int axis = 0; axis < 2; ++axis) out(m, axis) = xy(m, axis);
+Array<double, 3> corners_at(View<const double, 2> xy, View<const std::int32_t, 2> corners) {
+  Array<double, 3> out({corners.size(), 3, 2});
+  for (Index i = 0; i < corners.size(); ++i) {
+    for (Index k = 0; k < 3; ++k) copy<double, 1>(xy[corners(i, k)], out[i][k]);
   }
+  return out;
+}
+
+Array<double, 2> predict_missing(const WarmTables& tables, View<const double, 2> xy) {
+  const auto completion = tables.completion;
+  const auto weights = tables.completion_weights;
+  Array<double, 2> out(xy);
   Array<double, 1> count({xy.size()}, 0.0);
   for (Index row = 0; row < completion.size(); ++row) {
     const std::int32_t d = completion(row, 3);

@@ -10,14 +10,6 @@ from numpy.typing import NDArray
 from extractor._native import solve as native
 from extractor.refine.solve.fisher_information import Information
 
-# The remaining share of a usual step is the square of blur over edge, times
-BLUR_REMAINDER = 20.0
-
-
-def remaining_share(sigma: float, edge_px: float) -> float:
-    """The share of a usual step that is left after the step, by blur and edge, px."""
-    return BLUR_REMAINDER * (sigma / edge_px) ** 2
-
 
 class StepRemainder(NamedTuple):
     """A step of M markers, and the error that the step leaves.
@@ -54,17 +46,3 @@ def step_remainder(
         information: about the markers.
     """
     return native.step_remainder(measured, drawn, last, sigma, remaining_share, information.diagonal)
-
-
-def typical_bending(bend: NDArray[np.float64], is_read: NDArray[np.bool_], information: Information) -> float:
-    """The RMS bending of the gridlines that are read, in deviations of a typical marker.
-
-    Args:
-        bend: (E, 2) px.
-        is_read: (E,) bool.
-        information: about the markers.
-
-    Returns:
-        Infinity where no gridline is read.
-    """
-    return native.typical_bending(bend, is_read, information.diagonal)

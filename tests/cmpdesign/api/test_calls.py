@@ -137,7 +137,11 @@ def test_a_dictionary_is_checked_as_a_file_is(design: cmpdesign.Design) -> None:
 
 
 def test_a_plain_layout_is_taken_by_the_calls(design: cmpdesign.Design, image: np.ndarray) -> None:
-    assert cmpdesign.verify(plain_layout(design), image).verified
+    found = cmpdesign.verify(plain_layout(design), image)
+    assert found.verified and found.found.markers.found
+    several = cmpdesign.verify(design.layout, [image, image[::-1].copy()])
+    assert [each.verified for each in several.images] == [True, False] and not several.verified
+    assert several.found is None
     assert cmpdesign.Layout.of(plain_layout(design)).digest == design.layout.digest
 
 

@@ -41,7 +41,19 @@ def test_a_command_has_the_options_of_its_call(name: str, record: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", ["build", "check", "extract", "calibrate pattern", "calibrate rig", "export lerobot", "kerf"]
+    "words",
+    [
+        "build",
+        "check",
+        "dataset",
+        "extract",
+        "calibrate pattern",
+        "calibrate rig",
+        "export lerobot",
+        "kerf",
+        "render",
+        "templates",
+    ],
 )
 def test_a_command_has_the_parameters_and_defaults_of_its_call(words: str) -> None:
     command: Any = get_command(app)
@@ -53,6 +65,18 @@ def test_a_command_has_the_parameters_and_defaults_of_its_call(words: str) -> No
             assert taken[each.name].required == (each.default is each.empty), each.name
             if isinstance(each.default, int | float | str):
                 assert taken[each.name].default == each.default
+
+
+def test_every_command_that_ends_by_itself_is_a_call_of_its_name() -> None:
+    found = set()
+    for name, command in get_command(app).commands.items():  # type: ignore[attr-defined]
+        names = getattr(command, "commands", {"": None})
+        found |= {f"{name}_{sub}".strip("_") if name != "evaluate" else name for sub in names}
+    assert found - {name for name in found if callable(getattr(cmpdesign, name, None))} == {
+        "serve",
+        "studio",
+        "view",
+    }
 
 
 class More(TypedDict, total=False):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import pickle
+import shutil
+import subprocess
 import threading
 import time
 from collections.abc import Callable
@@ -333,6 +335,39 @@ def test_results_are_served(folder: Path, plug: Plug, shots: list[Any]) -> None:
         for pair in STORE.deserialize_cdr(data, "diagnostic_msgs/msg/DiagnosticArray").status[0].values
     }
     assert {"latency_ms", "dropped", "events"} <= values
+
+
+@pytest.mark.slow
+def test_a_program_in_cpp_reads_the_same_bytes(folder: Path, plug: Plug, shots: list[Any]) -> None:
+    """The example is compiled; the markers that it prints are those that the other client receives."""
+    compiler = shutil.which("g++") or shutil.which("clang++")
+    if compiler is None:
+        pytest.skip("no compiler of C++")
+    source = Path(__file__).parents[3] / "examples" / "subscriber.cpp"
+    warnings = ("-std=c++20", "-Wall", "-Wextra", "-Werror")
+    subprocess.run([compiler, *warnings, "-o", folder / "subscriber", source], check=True)
+    plug(TimedCamera([one.image for one in shots], FPS), TimedCamera([one.image for one in shots], FPS))
+    with opened(folder / "thumb.toml", folder / "index.toml") as sensors:
+        sensors.wait()
+        server, received = SensorServer(sensors, 0), Received()
+        port = server.address.rpartition(":")[2]
+        words = [folder / "subscriber", port, "/index/markers"]
+        with open_client(int(port)) as client:
+            process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+            while len(received.messages.get("/index/markers", ())) < 3 * FPS:
+                take(client, received, 10.0)
+        server.close()
+        printed = process.communicate(timeout=10)[0].splitlines()
+    clouds = [
+        STORE.deserialize_cdr(data, "sensor_msgs/msg/PointCloud2")
+        for _, data in received.messages["/index/markers"]
+    ]
+    seen = [
+        f"{one.width} markers of {one.point_step} bytes, marker 0 at "
+        + " ".join(f"{value:.3f}" for value in one.data[:12].view(np.float32))
+        for one in clouds
+    ]
+    assert len(printed) > FPS and set(printed) & set(seen) and len(set(printed) - set(seen)) <= 3
 
 
 WRONG = {

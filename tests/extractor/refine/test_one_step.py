@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from cmpdesign.scene import Camera
-from extractor.refine import synthesis_steps
-from extractor.refine.synthesis_steps import SynthesisSolver
+from extractor.layout.topology import topology_of
+from extractor.presets import SCHEDULES
+from extractor.refine.refiner import Refiner
 from tests.support.standard_views import extractor, shown
 
 LAYERS, ERROR_PX = 6, 0.01
@@ -22,24 +23,29 @@ def test_a_step_leaves_a_seventh_of_independent_errors_at_most(monkeypatch: pyte
     """Markers that are off by themselves bend the gridlines around others, too; a step that does not know leaves 0.17
     of the errors, and more at the rim.
     """
-    steps, max_steps = SynthesisSolver.steps, synthesis_steps.MAX_STEPS
-    calls: list[tuple[Any, ...]] = []
+    first_estimate, usual = Refiner.first_estimate, SCHEDULES["balanced"]
+    calls: list[tuple[Any, Any]] = []
 
-    def keep(solver: SynthesisSolver, view: Any, estimate: Any, schedule: Any) -> Any:
-        last = steps(solver, view, estimate, schedule._replace(small_remainder=0.0))
-        calls.append((solver, view, last, schedule))
-        return last
+    def keep(refiner: Refiner, view: Any, *arguments: Any) -> Any:
+        calls.append((view, first_estimate(refiner, view, *arguments)))
+        return calls[-1][1]
 
-    monkeypatch.setattr(SynthesisSolver, "steps", keep)
+    def measured(layout: Any, small_remainder: float, first: Any) -> Any:
+        monkeypatch.setitem(SCHEDULES, "balanced", usual._replace(small_remainder=small_remainder))
+        return Refiner(topology_of(layout), "balanced", 0).measured(calls[-1][0], first)
+
+    monkeypatch.setattr(Refiner, "first_estimate", keep)
     left, rng = [], np.random.default_rng(0)
     for pattern in ("honeycomb", "round", "elliptical"):
         for seed in range(2):
             seen = shown(pattern, layers=LAYERS, size=(320, 280), camera=Camera(20.0), seed=seed)
-            monkeypatch.setattr(synthesis_steps, "MAX_STEPS", max_steps)
-            extractor(pattern, "balanced", LAYERS).extract(seen.image)
-            solver, view, last, schedule = calls[-1]
-            error = rng.normal(0.0, ERROR_PX, last.measured.shape)
-            moved = last._replace(measured=last.measured + error, reliable=last.reliable + error)
-            monkeypatch.setattr(synthesis_steps, "MAX_STEPS", 1)
-            left.append(steps(solver, view, moved, schedule).measured - last.measured)
+            by = extractor(pattern, "balanced", LAYERS)
+            by.extract(seen.image)
+            view, first = calls[-1]
+            last = measured(by.layout, 0.0, first)  # as many steps as there may be
+            look = last.appearance
+            moved = view.to_level(last.xy_px) + rng.normal(0.0, ERROR_PX, last.xy_px.shape)
+            start = first._replace(measured=moved, reliable=moved, dot_gain=0.0, sigma=look.sigma)
+            once = measured(by.layout, np.inf, start._replace(noise=look.noise, levels=look.levels))
+            left.append((once.xy_px - last.xy_px) / view.scale)
     assert np.sqrt(np.mean(np.concatenate(left) ** 2)) < ERROR_PX / 7

@@ -14,7 +14,7 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import Light, render, standard_layout, standard_scene
 from extractor import parse_layout
 from extractor.pipeline import ImageReader
-from extractor.track.image_check import check_cells, light_levels
+from extractor.track.warm_start import seen_cells
 from extractor.track.warm_tables import build_warm_tables
 
 
@@ -23,19 +23,19 @@ def test_levels_follow_the_light(gain: float) -> None:
     layout = standard_layout("honeycomb", 6)
     reference = parse_layout(layout_to_json(layout))
     reader, tables = ImageReader(reference), build_warm_tables(reference)
-    looks, levels = [], []
+    looks, light = [], []
     for factor in (1.0, gain):
         scene = replace(standard_scene(layout), light=Light(rgb=(factor, factor, factor)))
         image = np.asarray(render(scene).image, np.uint8)
         read = reader.read(image)
         looks.append(read.appearance)
-        found = check_cells(image, read.markers.xy_px[tables.corners], tables, None)
         pyramid = reader.pyramid(image)
         assert pyramid is not None
-        levels.append(light_levels(found.cell_levels, pyramid.response))
+        view = pyramid.level(1)
+        light.append(seen_cells(view, view, read.markers.xy_px, tables).light)
     before, now = looks
     assert before is not None and now is not None
-    relit = before.with_lighting(*levels)
+    relit = before.with_lighting(*light)
     assert np.median(np.abs(relit.levels.cell - now.levels.cell)) < 0.02 * np.median(
         now.levels.cell.max(axis=1)
     )

@@ -1,7 +1,6 @@
 // Room "measure" for Python.
 #include "base/binding.hpp"
 
-#include "refine/measure/dot_gain.hpp"
 #include "refine/measure/gridline_offsets.hpp"
 #include "refine/measure/gridline_weights.hpp"
 #include "refine/measure/marker_scatter.hpp"
@@ -10,10 +9,8 @@ namespace cmp::refine {
 
 void add_measure(nb::module_ module) {
   bind<&measure_scatter>(module, "measure_scatter", {"xy", "maps", "diagonal", "topology"});
-  bind<&measure_offsets>(module, "measure_offsets", {"view", "reading"});
-  bind<&virtual_markers>(module, "virtual_markers", {"lines", "offsets", "scale"});
+  bind<&virtual_markers>(module, "virtual_markers", {"reading", "scale"});
   bind<&short_edge>(module, "short_edge", {"xy", "edges", "rarity"});
-  bind<&markers_without_dot_gain>(module, "markers_without_dot_gain", {"xy", "cells", "dot_gain"});
   module.attr("MIN_NOISE") = GridlineWeightLimits{}.min_noise;
   module.attr("MIN_SIGMA_PX") = GridlineWeightLimits{}.min_sigma_px;
 }

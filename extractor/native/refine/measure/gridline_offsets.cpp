@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "numeric/median.hpp"
-#include "refine/synthesis/gridline_sides.hpp"
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/station_sums.hpp"
 
@@ -62,11 +61,10 @@ void update_without_profiles(View<double, 3> offsets, View<const double, 2> cont
 
 }  // namespace
 
-Array<double, 3> measure_offsets(const image::PyramidLevel& view, const GridlineReading& reading,
-                                 const OffsetLimits& limits) {
+Array<double, 3> measure_offsets(const GridlineReading& reading, const OffsetLimits& limits) {
   const View<const double, 2> lines = reading.lines;
   const auto sums = reading.station_sums;
-  const auto contrasts = value_contrasts(reading.sides, view.response.encoded);
+  const auto contrasts = reading.contrasts;
   Array<double, 3> out({lines.size(), sums.size(1), 2}, NONE);
   for (Index e = 0; e < lines.size(); ++e) {
     const auto contrast = contrasts[e];
@@ -85,7 +83,9 @@ Array<double, 3> measure_offsets(const image::PyramidLevel& view, const Gridline
   return out;
 }
 
-Array<double, 3> virtual_markers(View<const double, 2> lines, View<const double, 3> offsets, double scale) {
+Array<double, 3> virtual_markers(const GridlineReading& reading, double scale, const OffsetLimits& limits) {
+  const auto lines = reading.lines;
+  const Array<double, 3> offsets = measure_offsets(reading, limits);
   const Index edges = offsets.size(), count = offsets.size(1);
   Array<double, 3> out({edges, count, 3});
   for (Index e = 0; e < edges; ++e) {

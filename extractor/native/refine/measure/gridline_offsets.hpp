@@ -1,9 +1,13 @@
 // Offsets of the gridlines at virtual markers, measured where refinement last compared the image with the
 // pattern.
+//
+// Rounded corners, halos and inks whose response differs shift the sides of all cells alike, by an amount
+// that depends on the ink and on the place along the side: its profile. A profile is no shape of the surface,
+// as colored cells lie on alternate sides of the gridlines. The median profile of each ink over the picture
+// is removed from the offsets.
 #pragma once
 
 #include "base/array.hpp"
-#include "image/pyramid.hpp"
 
 namespace cmp::refine {
 
@@ -19,7 +23,7 @@ struct OffsetLimits {
 // The gridlines and the levels beside them, where refinement last compared the image with the pattern.
 struct GridlineReading {
   View<const double, 2> lines;            // (E, 8), as gridlines gives them
-  View<const double, 2> sides;            // (E, 6), the light on both sides, as GridlineSides gives it
+  View<const double, 2> contrasts;        // (E, 3) gray levels, as value_contrasts gives them
   View<const double, 3> station_sums;     // (E, m, 2), as accumulate_station_sums gives them
   View<const double, 1> weight;           // (E,) 0 to 1
   View<const double, 1> variance_ratio;   // (E,), as variance_ratios gives it
@@ -27,7 +31,7 @@ struct GridlineReading {
   double sigma;                           // px, the blur
   double noise;                           // gray levels
 
-  CMP_RECORD("extractor.refine.measure.gridline_offsets.GridlineReading", lines, sides, station_sums, weight,
+  CMP_RECORD("extractor.refine.estimate.GridlineReading", lines, contrasts, station_sums, weight,
              variance_ratio, dot_gain_offset, sigma, noise)
 };
 
@@ -35,12 +39,12 @@ struct GridlineReading {
 //
 // (E, m, 2): px, the offset towards (-uy, ux) less that of dot gain and of the ink's profile; px^2, its
 // variance. NaN where the gridline has no contrast or little weight or leaves the image.
-Array<double, 3> measure_offsets(const image::PyramidLevel& view, const GridlineReading& reading,
-                                 const OffsetLimits& limits);
+Array<double, 3> measure_offsets(const GridlineReading& reading, const OffsetLimits& limits);
 
-// (E, m, 3) x and y, px at full scale, and the variance across the gridline, px^2.
+// (E, m, 3) the virtual markers: x and y, px at full scale, and the variance across the gridline, px^2; NaN
+// where not measured.
 //
-// lines (E, 8); offsets (E, m, 2), as measure_offsets gives them; scale, full-scale pixels per pixel.
-Array<double, 3> virtual_markers(View<const double, 2> lines, View<const double, 3> offsets, double scale);
+// scale, full-scale pixels per pixel.
+Array<double, 3> virtual_markers(const GridlineReading& reading, double scale, const OffsetLimits& limits);
 
 }  // namespace cmp::refine

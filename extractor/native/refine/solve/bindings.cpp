@@ -9,7 +9,6 @@ namespace cmp::refine {
 void add_solve(nb::module_ module) {
   bind<&step_remainder>(module, "step_remainder",
                         {"measured", "drawn", "last", "sigma", "remaining_share", "diagonal"});
-  bind<&typical_bending>(module, "typical_bending", {"bend", "is_read", "diagonal"});
   bind<&solve_shifts>(module, "solve_shifts", {"diagonal", "off_diagonal", "edges", "right", "whole"});
   bind<&covariances>(module, "covariances",
                      {"diagonal", "off_diagonal", "edges", "spokes", "min_information", "selected"});

@@ -1,7 +1,6 @@
 // Room "synthesis" for Python.
 #include "base/binding.hpp"
 
-#include "refine/synthesis/blur_bleed.hpp"
 #include "refine/synthesis/gridlines.hpp"
 #include "refine/synthesis/ink_levels.hpp"
 
@@ -11,7 +10,6 @@ void add_synthesis(nb::module_ module) {
   bind<&gridlines>(module, "gridlines", {"xy", "maps", "bend", "edges", "along", "scatter_share"});
   bind<&local_maps>(module, "local_maps", {"xy", "near", "offset", "stencil"});
   bind<&level_change>(module, "level_change", {"before", "now"});
-  bind<&remove_bleed>(module, "remove_bleed", {"levels", "color", "share", "median_share"});
 }
 
 }  // namespace cmp::refine
