@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from benchmarks.frame.parallel import results_of
 from benchmarks.suites.camera.cases import make_cases, sample_chain
-from benchmarks.suites.camera.shoot import cached_layout, shoot
-from benchmarks.suites.scenes import SCENE_KINDS, WRONG_SHARE, SceneCase, shortest_edges
+from benchmarks.suites.camera.shoot import shoot
+from benchmarks.suites.scenes import SCENE_KINDS, WRONG_SHARE, SceneCase, shortest_edges, standard_layout
 from benchmarks.suites.scoring.calibration import squared_distances, summarise
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
@@ -66,14 +66,14 @@ class Figures:
 def scene_picture(number: int, seed: int, code: int) -> Picture:
     """The scenes of ``benchmarks.accuracy``."""
     pattern, kind = PATTERNS[number % len(PATTERNS)], SCENE_KINDS[number // len(PATTERNS) % len(SCENE_KINDS)]
-    layout = cached_layout(pattern, STANDARD_LAYERS, code)
+    layout = standard_layout(pattern, STANDARD_LAYERS, code)
     shot = render(replace(SceneCase(pattern, kind).scene(layout), seed=seed + number), size=STANDARD_SIZE)
     return Picture(shot.image, layout, shot.truth.marker_xy_px, shot.truth.visible)
 
 
 def damaged_picture(number: int, seed: int, code: int) -> Picture:
     """The random damage of ``benchmarks.damage``."""
-    layout = cached_layout(PATTERNS[number % len(PATTERNS)], STANDARD_LAYERS, code)
+    layout = standard_layout(PATTERNS[number % len(PATTERNS)], STANDARD_LAYERS, code)
     frame = PatternFrame(standard_scene(layout, seed=seed + number), STANDARD_SIZE)
     changed = RANDOM_KINDS[number % len(RANDOM_KINDS)].change(frame, 0)
     shot = changed.shoot()
@@ -96,7 +96,7 @@ SUITES: dict[str, Callable[[int, int, int], Picture]] = {
 
 @cache
 def _reader(pattern: str, layers: int, code: int) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers, code))))
+    return Extractor(parse_layout(layout_to_json(standard_layout(pattern, layers, code))))
 
 
 def read_picture(number: int, suite: str, seed: int, code: int) -> PictureCounts:

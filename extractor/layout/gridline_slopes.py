@@ -59,28 +59,25 @@ def slope_weights(
 ) -> SlopeWeights:
     """The weights; the arguments are ``derivative_stencil`` and others of ``Topology``."""
     x, y = edge_vectors.T
-    ids, first, second, chord = [], [], [], []
-    for at in (0, 1):
-        marker = edges[:, at]
+    count, width = len(edges), ring_markers.shape[1] + 1
+    along = np.zeros((count, 2, 5))  # the first and the second derivative along the edge, of x, y, xx, xy, yy
+    along[:, 0, :2] = edge_vectors
+    along[:, 1, 2:] = np.stack([x * x, 2 * x * y, y * y], axis=1)
+    ids = np.empty((count, 2 * width), np.int64)
+    leave, arrive = np.zeros((2, 2, count, 2 * width))
+    for at, block in enumerate((slice(0, width), slice(width, None))):
+        marker = edges[:, at, None]
+        ring = ring_markers[edges[:, at]]
         # a missing neighbour has no weight, whatever its id
-        ring = np.where(ring_markers[marker] >= 0, ring_markers[marker], marker[:, None])
-        ids.append(np.concatenate([ring, marker[:, None]], axis=1))
-        weights = stencil[marker]
-        first.append(_with_own(x[:, None] * weights[:, 0] + y[:, None] * weights[:, 1]))
-        curved = np.stack([x * x, 2 * x * y, y * y], axis=1)
-        second.append(_with_own(np.einsum("ed,edk->ek", curved, weights[:, 2:])))
-        chord.append(np.zeros_like(first[at]))
-        chord[at][:, -1] = CHORD[at]
-    nothing, both_chords = np.zeros_like(first[0]), np.concatenate(chord, axis=1)
-    leave = [
-        np.concatenate([first[0], nothing], axis=1) - both_chords,
-        np.concatenate([2 * second[0], second[1]], axis=1) / -6.0,
-    ]
-    arrive = [
-        np.concatenate([nothing, first[1]], axis=1) - both_chords,
-        np.concatenate([second[0], 2 * second[1]], axis=1) / 6.0,
-    ]
-    return SlopeWeights(np.concatenate(ids, axis=1), np.stack(leave), np.stack(arrive))
+        ids[:, block] = np.concatenate([np.where(ring >= 0, ring, marker), marker], axis=1)
+        of_ring = np.moveaxis(along @ stencil[edges[:, at]], 1, 0)
+        first, second = np.concatenate([of_ring, -of_ring.sum(axis=2, keepdims=True)], axis=2)
+        (leave, arrive)[at][0, :, block] = first
+        leave[1, :, block] = second * ((2.0, 1.0)[at] / -6.0)
+        arrive[1, :, block] = second * ((1.0, 2.0)[at] / 6.0)
+    for slopes in (leave, arrive):
+        slopes[0, :, [width - 1, -1]] -= CHORD[:, None]
+    return SlopeWeights(ids, leave, arrive)
 
 
 def end_couplings(slopes: SlopeWeights, edges: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -158,8 +155,3 @@ def scatter_bending(
     weights = 0.5 * (slopes.leave - slopes.arrive)
     at_markers: NDArray[np.float64] = native.scatter_bending(slopes.ids, weights, normals, spokes)
     return np.asarray(at_markers[edges].mean(axis=1))
-
-
-def _with_own(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The weights of differences from a marker to its ring (E, K), and that of the marker itself (E, K + 1)."""
-    return np.concatenate([weights, -weights.sum(axis=1, keepdims=True)], axis=1)

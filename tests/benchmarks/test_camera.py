@@ -45,7 +45,8 @@ from benchmarks.suites.camera.reading import (
     score_picture,
 )
 from benchmarks.suites.camera.sensor import demosaic, mosaic_channels
-from benchmarks.suites.camera.shoot import cached_layout, radiance, shoot
+from benchmarks.suites.camera.shoot import radiance, shoot
+from benchmarks.suites.scenes import standard_layout
 from benchmarks.suites.scoring.contrast import neighbour_contrast
 from cmpdesign.patterns.colors import BLUE, COLORS, GREEN, RED
 from cmpdesign.scene import Camera, Optics, Plain, Scene, Sensor, render
@@ -57,7 +58,7 @@ def test_an_undisturbed_picture_is_the_scenes() -> None:
     """The light of the neutral chain is that of the scene's linear image; so is the truth."""
     inks = {name: tuple(255 * np.array(getattr(Inks(), name))) for name in COLORS}
     scene = Scene(
-        layout=cached_layout("honeycomb", 9),
+        layout=standard_layout("honeycomb", 9),
         camera=Camera(20.0, 7.3),
         background=Plain(inks["black"]),
         optics=Optics(0.8),

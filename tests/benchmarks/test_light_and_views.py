@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.suites.camera.parts import PIGMENTS, Chain, Inks, Pose
-from benchmarks.suites.camera.shoot import cached_layout, shoot
+from benchmarks.suites.camera.shoot import shoot
+from benchmarks.suites.scenes import standard_layout
 from benchmarks.suites.sweeps.lines import (
     BLACK_LEVELS,
     BLACKS,
@@ -76,7 +77,7 @@ def test_steps_between_read_ones_are_counted() -> None:
 )
 def test_motions_are_those_of_the_plane(seed: int, layers: int, share: float, block: bool) -> None:
     """Turns and shifts of places in the plane, tried one by one, put the same number of views into the pattern."""
-    layout, rng = cached_layout("honeycomb", layers), np.random.default_rng(seed)
+    layout, rng = standard_layout("honeycomb", layers), np.random.default_rng(seed)
     cells = colored_cells(layout)
     order = rng.permutation(len(cells))
     middle_mm = layout.marker_xy_mm[layout.cell_corners[cells]].mean(axis=1)

@@ -14,8 +14,9 @@ from benchmarks.suites.ablation.provoking import provoking_cases
 from benchmarks.suites.ablation.seen_views import traced_cases, view_cases
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.calibration.suites import suites_by_name
+from benchmarks.suites.scenes import standard_layout
 from benchmarks.suites.stress.conditions import BY_NAME
-from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, cached_layout
+from benchmarks.suites.stress.frames import PATTERNS, PatternFrame
 from benchmarks.suites.stress.kinds import StressCase, make_frame
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
 from cmpdesign.files.layout_json import layout_to_json
@@ -79,7 +80,7 @@ def random_damage_cases(seed: int, draws: int) -> list[CalibrationCase]:
     ]
     frames = [make_frame(case, BY_NAME[case.kind]) for case in own]
     return [
-        CalibrationCase(case.kind, cached_layout(case.pattern), frame.shoot)
+        CalibrationCase(case.kind, standard_layout(case.pattern), frame.shoot)
         for case, frame in zip(own, frames, strict=True)
         if isinstance(frame, PatternFrame)
     ]

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.suites.calibration.cases import CalibrationCase
+from benchmarks.suites.scenes import standard_layout
 from benchmarks.suites.stress.damage import missing_cell_clusters, white_elsewhere, white_neighbours_missing
 from benchmarks.suites.stress.empty import EMPTY_KINDS
-from benchmarks.suites.stress.frames import PATTERNS, EmptyFrame, PatternFrame, cached_layout, plain_frame
+from benchmarks.suites.stress.frames import PATTERNS, EmptyFrame, PatternFrame, plain_frame
 from benchmarks.suites.stress.random_damage import (
     RANDOM_KINDS,
     sample_deformed,
@@ -107,7 +108,7 @@ def with_missing_clusters(frame: PatternFrame, rng: Rng) -> PatternFrame:
 
 def large_and_damaged(frame: PatternFrame, rng: Rng) -> PatternFrame:
     """A pattern of 60 layers, 10,981 markers, scratched, with missing cells."""
-    layout = cached_layout(frame.layout.pattern, LARGE_LAYERS)
+    layout = standard_layout(frame.layout.pattern, LARGE_LAYERS)
     large = replace(frame.with_parts(layout=layout).with_camera(pitch_px=LARGE_PITCH_PX), size=LARGE_SIZE)
     draw = sample_long_scratches if rng.random() < 0.5 else sample_short_scratches
     return large.damaged(**draw(large, rng), missing_share=float(rng.uniform(0, 0.1)))
@@ -142,7 +143,7 @@ def provoking_cases(seed: int) -> Iterator[CalibrationCase]:
     for number in count():
         kind, turn = kinds[number % len(kinds)], number // len(kinds)
         pattern, own = PATTERNS[turn % len(PATTERNS)], (seed + 7919 * number) % 2**31
-        layout = cached_layout(pattern, LARGE_LAYERS if kind == "large" else LAYERS)
+        layout = standard_layout(pattern, LARGE_LAYERS if kind == "large" else LAYERS)
         if kind == FOREIGN:
             yield CalibrationCase(kind, layout, partial(shoot_foreign, own, pattern))
         else:

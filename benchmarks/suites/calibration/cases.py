@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,6 +25,29 @@ class CalibrationPicture(Protocol):
     @property
     def truths(self) -> Sequence[TruePositions]:
         """One entry for each pattern in the picture, at least one."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownPositions:
+    """The true positions of one pattern.
+
+    Attributes:
+        marker_xy_px: (M, 2).
+        virtual_xy_px: (E, m, 2), in the order of the layout's edges; without rows where not known.
+        visible: (M,) bool; None where not known.
+    """
+
+    marker_xy_px: NDArray[np.float64]
+    virtual_xy_px: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0, 2)))
+    visible: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class KnownPicture:
+    """A picture with the positions of its one pattern."""
+
+    image: NDArray[np.uint8]
+    truths: tuple[KnownPositions, ...]
 
 
 @dataclass(frozen=True, eq=False)

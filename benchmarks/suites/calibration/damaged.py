@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.suites.calibration.cases import CalibrationCase, frame_case, random_view
-from benchmarks.suites.scenes import SceneCase
+from benchmarks.suites.scenes import SceneCase, standard_layout
 from benchmarks.suites.stress.conditions import BY_NAME, make_cases
-from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, cached_layout
+from benchmarks.suites.stress.frames import PATTERNS, PatternFrame
 from benchmarks.suites.stress.kinds import make_frame
 from cmpdesign.scene import Blob, Camera, Damage, Press, Scratch, Twist, composed, standard_scene
 from cmpdesign.scene.standard import BLACK_RGB
@@ -80,7 +80,7 @@ def damage_cases(quick: bool, seed: int) -> Iterator[CalibrationCase]:
     """Every kind of damage on a flat, a pressed and a twisted surface, all patterns."""
     draws = 1 if quick else DAMAGE_DRAWS
     for pattern in PATTERNS:
-        layout = cached_layout(pattern, DAMAGE_LAYERS)
+        layout = standard_layout(pattern, DAMAGE_LAYERS)
         for number, surface in enumerate(DAMAGE_SURFACES):
             camera = Camera(20.0, 7.3, 10.0 * number, 30.0)
             plain = replace(standard_scene(layout), surface=surface, camera=camera)
@@ -100,7 +100,7 @@ def stress_cases(quick: bool, seed: int) -> Iterator[CalibrationCase]:
         kind = BY_NAME[case.kind]
         frame = make_frame(seeded, kind)
         if isinstance(frame, PatternFrame):
-            yield CalibrationCase(kind.group, cached_layout(case.pattern, frame_layers(frame)), frame.shoot)
+            yield CalibrationCase(kind.group, standard_layout(case.pattern, frame_layers(frame)), frame.shoot)
 
 
 def frame_layers(frame: PatternFrame) -> int:

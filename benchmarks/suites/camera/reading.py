@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.suites.camera.cases import CameraCase, sample_chain
-from benchmarks.suites.camera.shoot import CameraPicture, cached_layout, shoot
-from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges
+from benchmarks.suites.camera.shoot import CameraPicture, shoot
+from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges, standard_layout
 from benchmarks.suites.scoring.calibration import squared_distances
 from benchmarks.suites.scoring.contrast import neighbour_contrast
 from cmpdesign.files.layout_json import layout_to_json
@@ -77,7 +77,7 @@ class PictureResult:
 
 @cache
 def cached_extractor(pattern: str, layers: int, preset: Preset, code: int = 0) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers, code))), preset)
+    return Extractor(parse_layout(layout_to_json(standard_layout(pattern, layers, code))), preset)
 
 
 def read_case(case: CameraCase, preset: Preset) -> PictureResult:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cache
 
 import cv2
 import numpy as np
@@ -25,9 +24,10 @@ from benchmarks.suites.camera.pad import cell_polygons_mm, colored_cells
 from benchmarks.suites.camera.parts import SIZE_PX, Chain, Inks
 from benchmarks.suites.camera.sensor import expose
 from benchmarks.suites.camera.surrounds import surround_planes
+from benchmarks.suites.scenes import standard_layout
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import COLORS
-from cmpdesign.scene import Camera, standard_layout
+from cmpdesign.scene import Camera
 from cmpdesign.scene.camera.plain import camera_homography, project_by_homography
 from cmpdesign.scene.drawing.coverage import draw_coverage
 from cmpdesign.scene.drawing.paths import join_segments, project_polygons
@@ -38,8 +38,6 @@ Points = NDArray[np.float64]
 Planes = NDArray[np.float32]
 PAD_STREAM, SURROUND_STREAM, NOISE_STREAM = range(3)
 CHANNELS = (0, 1, 2)  # B, G, R
-
-cached_layout = cache(standard_layout)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +66,7 @@ def shoot(chain: Chain) -> CameraPicture:
     light = spread_light(light, chain.lens)
     gains = balance_gains(chain.development, mean_light / mean_light.max())
     exposed = expose(light, chain.sensor, gains, _stream(chain, NOISE_STREAM))
-    layout = cached_layout(chain.pose.pattern, chain.pose.layers, chain.pose.code)
+    layout = standard_layout(chain.pose.pattern, chain.pose.layers, chain.pose.code)
     marker_xy_px = image_map(chain, None)(layout.marker_xy_mm)
     inside = (marker_xy_px >= -0.5) & (marker_xy_px < np.array(SIZE_PX) - 0.5)
     return CameraPicture(
@@ -91,14 +89,14 @@ def image_map(chain: Chain, channel: int | None) -> Callable[[Points], Points]:
     """The map from the layout (N, 2) mm to the image (N, 2) px, in a channel or in the truth's (None)."""
     pose = chain.pose
     camera = Camera(pose.pitch_px, pose.roll_deg, pose.tilt_deg, pose.tilt_axis_deg, pose.centre_px)
-    homography = camera_homography(camera, cached_layout(pose.pattern, pose.layers, pose.code), SIZE_PX)
+    homography = camera_homography(camera, standard_layout(pose.pattern, pose.layers, pose.code), SIZE_PX)
     through_lens = lens_map(chain.lens, channel)
     return lambda xy_mm: through_lens(project_by_homography(homography, xy_mm))
 
 
 def _draw_channels(chain: Chain, background: Planes, channels: tuple[int, ...]) -> Planes:
     """(len(channels), H, W): the channels that share one geometry."""
-    layout = cached_layout(chain.pose.pattern, chain.pose.layers, chain.pose.code)
+    layout = standard_layout(chain.pose.pattern, chain.pose.layers, chain.pose.code)
     inks = _ink_table(chain.inks)[:, channels]
     black = inks[COLORS.index("black")]
     polygons = cell_polygons_mm(layout, chain.pad, chain.pose.pitch_px, _stream(chain, PAD_STREAM))

@@ -14,8 +14,9 @@ from benchmarks.suites.comparison.measure import (
     point_errors,
     required_markers,
 )
-from benchmarks.suites.comparison.methods import METHODS, FoundPoints, Method
+from benchmarks.suites.comparison.methods import METHODS, Method
 from benchmarks.suites.scenes import STANDARD_BLUR_PX, STANDARD_PITCH_PX, Response, SceneCase
+from benchmarks.suites.scoring.calibration import squared_distances
 from cmpdesign.scene import render
 from cmpdesign.scene.bounds.exact_bound import exact_bound
 from cmpdesign.scene.standard import STANDARD_SIZE
@@ -123,23 +124,14 @@ def _update_sums(
             part.squared_px2.append((errors[found] ** 2).sum(axis=1))
             part.bound_px2.append(bound_px2[found])
             part.inner.append(inner[found])
-            part.normalised.append(_normalised_squares(errors, reading, found))
+            if reading.cov_px2 is not None:
+                part.normalised.append(squared_distances(errors[found], reading.cov_px2[found]))
             part.ms.append(reading.ms)
-
-
-def _normalised_squares(
-    errors: NDArray[np.float64], reading: FoundPoints, found: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """(N,) e' C^-1 e of the found markers; empty if the method states no covariance."""
-    if reading.cov_px2 is None:
-        return np.empty(0)
-    inverse = np.linalg.inv(reading.cov_px2[found])
-    return np.asarray(np.einsum("ni,nij,nj->n", errors[found], inverse, errors[found]))
 
 
 def _pooled_result(name: str, part: _PooledSums) -> PooledResult:
     squared, bound = np.concatenate(part.squared_px2), np.concatenate(part.bound_px2)
-    inner, normalised = np.concatenate(part.inner), np.concatenate(part.normalised)
+    inner, normalised = np.concatenate(part.inner), np.concatenate([np.empty(0), *part.normalised])
     return PooledResult(
         method=name, scenes=part.scenes, pictures=len(part.ms), found_share=len(squared) / part.required,
         wrong=part.wrong, rms_px=_rms_per_axis(squared), bound_px=_rms_per_axis(bound),

@@ -63,7 +63,7 @@ STATED = (
     ("molds of 1,452 cells as STEP", "11 s ([table](docs/how-to/molds.md#figures))", "molds"),
     (
         "start of a process to its first markers",
-        "twice the time to import numpy and OpenCV, 65 MB",
+        "1.7 times the time to import numpy and OpenCV, 58 MB",
         "startup",
     ),
 )

@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.scenes import shortest_edges, standard_layout
 from benchmarks.suites.scoring.score import (
     EMPTY_SCORE,
     MarkerScore,
     promised_markers,
     score_markers,
-    shortest_edges,
     wrong_markers,
 )
 from benchmarks.suites.scoring.squares import PictureSquares, nearest_truth, picture_squares
 from benchmarks.suites.stress.conditions import BY_NAME, LARGE_PX
-from benchmarks.suites.stress.frames import CaseImage, cached_layout, plain_frame
+from benchmarks.suites.stress.frames import CaseImage, plain_frame
 from benchmarks.suites.stress.kinds import StressCase, make_frame
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import STANDARD_SIZE, Truth
@@ -65,7 +65,7 @@ class CaseReading(NamedTuple):
 @cache
 def cached_extractor(pattern: str, layers: int) -> Extractor:
     """An extractor that reads both sides: one condition shows the back."""
-    return Extractor(parse_layout(layout_to_json(cached_layout(pattern, layers))), side="either")
+    return Extractor(parse_layout(layout_to_json(standard_layout(pattern, layers))), side="either")
 
 
 @cache
@@ -132,7 +132,7 @@ def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
     if markers is None or shot.scene is None:
         return []
     wrong, truth = find_wrong_markers(shot, markers)
-    edge_px = shortest_edges(shot.scene.layout, truth)
+    edge_px = shortest_edges(shot.scene.layout, truth.marker_xy_px)
     lost = promised_markers(shot.scene.layout, truth, shot.image.shape) & (markers.status == Status.LOST)
     lines = []
     for marker in [*np.flatnonzero(wrong), *np.flatnonzero(lost)[:MAX_LOST_LINES]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges
 from benchmarks.suites.stress.frames import CaseImage
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, WHITE
@@ -14,7 +15,6 @@ from cmpdesign.scene import Scene, Truth
 from cmpdesign.scene.parts.light import light_gain
 from extractor.result import Markers, Status
 
-WRONG_SHARE = 0.3  # of the shortest edge at a marker; a marker with a larger error is wrong
 PROMISED_EDGE_PX, PROMISED_BLUR, PROMISED_NOISE = 8.0, 1 / 5, 1 / 10  # px, of the edge, of the contrast
 MIN_RIM_DISTANCE_PX = 2.0  # nearer to the image's rim a marker's surroundings are incomplete
 PITCH_ROUNDING = 1e-6  # tolerance of the smallest edge
@@ -69,18 +69,8 @@ def score_markers(markers: Markers, shot: CaseImage, *, promised: bool) -> Marke
 def wrong_markers(markers: Markers, layout: Layout, truth: Truth) -> Bools:
     """(M,) bool: reported markers with an error above 0.3 of the shortest edge."""
     error = np.linalg.norm(markers.xy_px - truth.marker_xy_px, axis=1)
-    is_right = error <= WRONG_SHARE * shortest_edges(layout, truth)
+    is_right = error <= WRONG_SHARE * shortest_edges(layout, truth.marker_xy_px)
     return np.asarray((markers.status != Status.LOST) & ~is_right)
-
-
-def shortest_edges(layout: Layout, truth: Truth) -> NDArray[np.float64]:
-    """(M,) px: the length of the shortest edge at every marker."""
-    ends = truth.marker_xy_px[layout.edges]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    shortest = np.full(len(truth.marker_xy_px), np.inf)
-    for side in (0, 1):
-        np.minimum.at(shortest, layout.edges[:, side], length)
-    return shortest
 
 
 def promised_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
@@ -126,7 +116,9 @@ def _rms(markers: Markers, truth: Truth, chosen: Bools) -> float:
 
 def _is_promised(scene: Scene, truth: Truth, promised_mask: Bools, shape: tuple[int, ...]) -> bool:
     """Whether the promise applies: visible white cell, edges of 8 px, limits of blur and noise."""
-    edge_px = float(shortest_edges(scene.layout, truth)[promised_mask].min()) * (1 + PITCH_ROUNDING)
+    edge_px = float(shortest_edges(scene.layout, truth.marker_xy_px)[promised_mask].min()) * (
+        1 + PITCH_ROUNDING
+    )
     noise = scene.sensor.noise if scene.sensor else 0.0
     return (
         bool(truth.cell_visible[scene.layout.reference_cell])

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.stress.frames import EmptyFrame, PatternFrame, Size, cached_layout
+from benchmarks.suites.scenes import standard_layout
+from benchmarks.suites.stress.frames import EmptyFrame, PatternFrame, Size
 from benchmarks.suites.stress.kinds import ConditionKind, group_kinds
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, WHITE
@@ -65,7 +66,7 @@ def checkerboard_image(rng: np.random.Generator, size: Size, pitch_px: float) ->
 
 
 def _ink_colors() -> list[tuple[float, float, float]]:
-    inks = standard_scene(cached_layout("honeycomb", 2)).inks
+    inks = standard_scene(standard_layout("honeycomb", 2)).inks
     return [inks[name][::-1] for name in ("black", "red", "green", "blue", "white")]
 
 
@@ -73,7 +74,7 @@ def recolored_pattern_image(
     rng: np.random.Generator, size: Size, pitch_px: float, recolor: Callable[..., Layout]
 ) -> Pixels:
     """The honeycomb pattern's triangles in other colors."""
-    layout = recolor(cached_layout("honeycomb", 11), rng)
+    layout = recolor(standard_layout("honeycomb", 11), rng)
     scene = standard_scene(layout, seed=int(rng.integers(1 << 30)))
     camera = replace(scene.camera, pitch_px=pitch_px, rotation_deg=float(rng.uniform(0, 360)))
     scene = replace(scene, camera=camera, sensor=Sensor(2), background=Plain(tuple(rng.uniform(0, 255, 3))))

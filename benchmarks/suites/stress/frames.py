@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.scenes import standard_layout
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import (
     STANDARD_SIZE,
@@ -21,7 +21,6 @@ from cmpdesign.scene import (
     Truth,
     composed,
     render,
-    standard_layout,
     standard_scene,
 )
 from cmpdesign.scene.parts.surface import Deformation
@@ -136,14 +135,8 @@ class EmptyFrame:
         return CaseImage(np.clip(np.rint(drawn), 0, 255).astype(np.uint8), (), None)
 
 
-@cache
-def cached_layout(pattern: str, layers: int = 11) -> Layout:
-    """The layout of the standard scene, built once."""
-    return standard_layout(pattern, layers)
-
-
 def plain_frame(pattern: str, seed: int, layers: int = 11, size: Size = STANDARD_SIZE) -> PatternFrame:
     """The standard scene with a random rotation."""
-    frame = PatternFrame(standard_scene(cached_layout(pattern, layers), seed=seed), size)
+    frame = PatternFrame(standard_scene(standard_layout(pattern, layers), seed=seed), size)
     turn = float(np.random.default_rng([seed, 79]).uniform(0, 360))
     return frame.with_camera(rotation_deg=turn)
