@@ -26,7 +26,6 @@ from extractor.numbering.ink_fields import InkFields, Palette, ink_fields
 from extractor.numbering.joined_parts import joined_to
 from extractor.numbering.lattice_walk import Walk, WalkedCells, seen_from
 from extractor.numbering.witnesses import (
-    WHITE,
     BrightPlaces,
 )
 from extractor.result import Origin, Reason
@@ -435,7 +434,7 @@ def _uncertain_reason(placed: PlacedPart) -> Reason:
         return Reason.OTHER_CODE if is_other else Reason.AMBIGUOUS
     white = placed.motions.white
     close = placed.tied
-    whites = np.count_nonzero(white[close] > WHITE.max_without_triangle) + placed.other_whites
+    whites = np.count_nonzero(white[close] > 0.0) + placed.other_whites
     if whites > 1:
         return Reason.SEVERAL_PADS
     return Reason.AMBIGUOUS if np.count_nonzero(white[close] > 0.0) > 1 else Reason.REFERENCE_LOST

@@ -53,8 +53,8 @@ REGISTRATION = (
         "a white cell has the triangle of a down-cell",
         "no wrong id",
         "extractor/numbering/witnesses.py",
-        "min(float(is_bright), WHITE.max_without_triangle)",
-        "is_bright + WHITE.is_triangle",
+        "fields.is_triangle & (whiteness > BRIGHT)",
+        "(whiteness > BRIGHT)",
     ),
     Rule(
         "bright places",
