@@ -35,7 +35,7 @@ def page(measured: Mapping[str, Any]) -> Page:
 def _tile(picture: TracedPicture, entry: Mapping[str, Any]) -> Tile:
     image = cv2.resize(picture.image, TILE_PX, interpolation=cv2.INTER_AREA)
     scale = TILE_PX[0] / picture.image.shape[1]
-    lost = entry["unmeasured"] if entry["measured"] else []
+    lost = [*entry["unmeasured"]] if entry["measured"] else []
     draw_dots(image, picture.truth.xy_px[lost].reshape(-1, 2) * scale + 0.5 * (scale - 1), UNMEASURED_BGR)
     counts = f"{entry['measured']} of {entry['visible']}" if entry["visible"] else "no pattern"
     effects = ", ".join(picture.effects)

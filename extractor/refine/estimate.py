@@ -69,6 +69,8 @@ class GridlineReading(NamedTuple):
         weight: (E,) 0 to 1.
         variance_ratio: (E,) of the variance along each gridline to that of noise.
         dot_gain_offset: (E,) px, the shift of the gridline towards (-uy, ux) by dot gain.
+        ink_offset: (E,) px, towards (-uy, ux), from the stated gridline to the seen one, where inks lie off.
+        ink_variance: (E,) px^2, of the stated gridline, which covers the seen one.
         sigma: px, the blur.
         noise: gray levels.
     """
@@ -79,6 +81,8 @@ class GridlineReading(NamedTuple):
     weight: NDArray[np.float64]
     variance_ratio: NDArray[np.float64]
     dot_gain_offset: NDArray[np.float64]
+    ink_offset: NDArray[np.float64]
+    ink_variance: NDArray[np.float64]
     sigma: float
     noise: float
 
@@ -154,6 +158,7 @@ class FirstEstimate(NamedTuple):
         sigma: the blur, px.
         noise, pixel_noise, levels: as in ``Appearance``.
         dot_gain: distance by which the sides of all cells have moved outward, px.
+        ink_shift: (3, 2) shifts of the inks in the layout, in units of the mean edge; their mean is 0.
         contrasts: across the gridlines.
         places: the markers' places in the full image, outliers put where their neighbours predict them.
     """
@@ -167,6 +172,7 @@ class FirstEstimate(NamedTuple):
     noise: float
     pixel_noise: float
     dot_gain: float
+    ink_shift: NDArray[np.float64]
     levels: InkLevels
     contrasts: EdgeContrasts
     places: InitialMarkers

@@ -80,6 +80,14 @@ REFINEMENT = (
         "if (!(variance > 0.0)) return",
         "if (true) return",
     ),
+    Rule(
+        "shifted inks",
+        "cells of one ink that lie off together are drawn where they lie",
+        "errors and time",
+        "extractor/native/refine/measure/ink_shift.hpp",
+        "min_cells = 12",
+        "min_cells = 1000000000",
+    ),
 )
 
 COMPLETE = (

@@ -1,6 +1,7 @@
 #include "refine/drawn_pattern.hpp"
 
 #include "refine/measure/gridline_bending.hpp"
+#include "refine/measure/ink_shift.hpp"
 #include "refine/synthesis/gridline_sides.hpp"
 #include "refine/synthesis/pattern_drawing.hpp"
 
@@ -54,6 +55,7 @@ DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topolog
   const double sigma = state.sigma;
   Array<double, 2> lines = gridlines(xy, state.maps, state.bend, edges, topology.edge_vectors,
                                      state.scatter.share, limits.gridlines);
+  update_with_offsets(lines, ink_offsets(state.ink_shift, lines, state.maps, topology));
   const GridlineSides beside(lines, xy, cells, edge_cells, view.frame);
   Array<double, 2> sides = beside.light(levels);
   fill_zeros(picture, box);

@@ -17,6 +17,7 @@ struct PatternState {
   double sigma;                     // the blur, px
   double noise;                     // gray levels, one channel
   double dot_gain;                  // px
+  View<const double, 2> ink_shift;  // (3, 2) of the inks in the layout, in units of the mean edge
   MarkerScatter scatter;
 };
 

@@ -69,8 +69,10 @@ FirstEstimateArrays first_estimate(const image::PyramidLevel& view, const layout
     }
   }
   const Array<double, 1> smooth({xy.size()}, 0.0), alike({edges.size()}, 1.0);
-  const PatternState state{xy, hidden, maps, smooth, straight, alike, sigma, noise, 0.0, {0.0, 0.0}};
-  auto [profile_weight, weight, dot_gain, solution] =
+  const Array<double, 2> registered({SHIFTED_INKS, 2}, 0.0);
+  const PatternState state{xy,    hidden, maps, smooth,     straight,  alike,
+                           sigma, noise,  0.0,  registered, {0.0, 0.0}};
+  auto [profile_weight, weight, dot_gain, ink_shift, solution] =
       profile_step(view, lines, contrasts_of(contrasts), state, topology, rows, profiles);
   CorrectedOutliers after =
       correct_outliers(topology, {solution.measured, solution.reliable, hidden, maps, weight}, places,
@@ -85,6 +87,7 @@ FirstEstimateArrays first_estimate(const image::PyramidLevel& view, const layout
           noise,
           pixel_noise,
           dot_gain,
+          std::move(ink_shift),
           std::move(levels),
           std::move(contrasts),
           std::move(corrected)};

@@ -38,12 +38,13 @@ struct FirstEstimate {
   Information information;
   View<const double, 1> weight;
   double sigma, noise, pixel_noise, dot_gain;
+  View<const double, 2> ink_shift;
   InkLevels levels;
   EdgeContrasts contrasts;
   StartPlaces places;
 
   CMP_RECORD("extractor.refine.estimate.FirstEstimate", measured, reliable, bend, information, weight, sigma,
-             noise, pixel_noise, dot_gain, levels, contrasts, places)
+             noise, pixel_noise, dot_gain, ink_shift, levels, contrasts, places)
 };
 
 // The same, with memory of its own.
@@ -52,12 +53,13 @@ struct FirstEstimateArrays {
   InformationArrays information;
   Array<double, 1> weight;
   double sigma, noise, pixel_noise, dot_gain;
+  Array<double, 2> ink_shift;
   LevelArrays levels;
   ContrastArrays contrasts;
   numbering::InitialMarkers places;
 
   CMP_RECORD("extractor.refine.estimate.FirstEstimate", measured, reliable, bend, information, weight, sigma,
-             noise, pixel_noise, dot_gain, levels, contrasts, places)
+             noise, pixel_noise, dot_gain, ink_shift, levels, contrasts, places)
 };
 
 // The levels of the inks, the blur, and the round of profiles.

@@ -42,7 +42,10 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
   ShiftGradients gradients = shift_gradients(sums);
   const double dot_gain =
       measure_dot_gain(sums, gradients, contrasts, edge_cells, state.sigma, limits.dot_gain);
-  update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
+  Array<double, 2> ink_shift = measure_ink_shift(sums, gradients, lines, state.ink_shift, state.maps,
+                                                 state.sigma, topology, limits.ink_shift);
+  update_without_offsets(sums, gradients, dot_gain_offsets(sums, contrasts, edge_cells, dot_gain));
+  update_without_ink_shift(sums, gradients, lines, state.ink_shift, ink_shift, state.maps, topology);
   EliminatedBending bent = update_for_bending(
       sums, gradients, {state.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
       lines, edges, state.noise, rule, limits.step);
@@ -65,7 +68,7 @@ ProfileStep profile_step(const image::PyramidLevel& view, View<const double, 2> 
                               state.scatter.share};
   StepSolution solved = solve_step(system, gradients, state.bend,
                                    {topology, state.xy, state.hidden, bent.response}, limits.step);
-  return {std::move(profile_weight), std::move(weight), dot_gain, std::move(solved)};
+  return {std::move(profile_weight), std::move(weight), dot_gain, std::move(ink_shift), std::move(solved)};
 }
 
 }  // namespace cmp::refine

@@ -8,6 +8,7 @@
 #include "layout/topology.hpp"
 #include "refine/estimate.hpp"
 #include "refine/measure/dot_gain.hpp"
+#include "refine/measure/ink_shift.hpp"
 #include "refine/measure/matched_filter.hpp"
 #include "refine/outliers.hpp"
 #include "refine/refinement_step.hpp"
@@ -22,6 +23,7 @@ struct ProfileLimits {
   StepLimits step;
   MatchedFilterLimits rows;
   DotGainLimits dot_gain;
+  InkShiftLimits ink_shift;
   OutlierLimits outliers;
 };
 
@@ -29,6 +31,7 @@ struct ProfileStep {
   Array<double, 1> profile_weight;  // (E,) 0 to 1, similarity of each gridline to the pattern
   Array<double, 1> weight;          // (E,) 0 to 1, with which it was used
   double dot_gain;                  // px
+  Array<double, 2> ink_shift;       // (3, 2) as in PatternState
   StepSolution solution;
 };
 

@@ -85,8 +85,9 @@ WeighedProfiles weighed_profiles(const image::PyramidLevel& view, const PatternS
   Array<double, 2> sums = read_profiles(view, lines, {sides, across, clearance}, state.sigma, bending,
                                         limits.stations, limits.profiles.rows);
   ShiftGradients gradients = shift_gradients(sums);
-  update_without_dot_gain(sums, gradients, across, selected_rows(topology.edge_cells, numbers),
-                          state.dot_gain);
+  update_without_offsets(
+      sums, gradients,
+      dot_gain_offsets(sums, across, selected_rows(topology.edge_cells, numbers), state.dot_gain));
   const Array<double, 1> weight = selected_items(state.weight, numbers);
   const Array<double, 2> by_scatter = selected_rows(topology.scatter_bending, numbers);
   EliminatedBending bent =

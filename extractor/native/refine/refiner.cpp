@@ -29,6 +29,8 @@ FinalMarkers accepted_or_recovered(const image::PyramidLevel& view, const layout
       {solution.measured, solution.reliable, solution.information, after.bend_variance, after.reading.weight,
        after.noise, first.pixel_noise, after.dot_gain, after.convergence_cov_px2},
       places, topology, limits.final);
+  update_between_places(out.xy_px, out.cov_px2, after.ink_shift, after.reading.lines, after.drawn.maps,
+                        topology, limits.steps.step.ink_shift);
   if (out.all_accepted) return out;
   const auto [xy, hidden, maps] =
       extrapolate_pattern(solution.reliable, topology, limits.steps.step.step.gridlines);

@@ -20,11 +20,21 @@ View<float, 3> kept_picture(std::array<Index, 3> shape) {
   return {memory.data(), shape};
 }
 
-// Whether the next drawing would differ from the last one by small moves of the markers only. Blur or dot
-// gain that has changed, bending that was not drawn, and markers that scatter are drawn otherwise.
+// The largest difference between two arrays of shifts (3, 2).
+double largest_change(View<const double, 2> now, View<const double, 2> before) {
+  double largest = 0.0;
+  for (Index k = 0; k < now.flat().size(); ++k)
+    largest = std::max(largest, std::abs(now.flat()[k] - before.flat()[k]));
+  return largest;
+}
+
+// Whether the next drawing would differ from the last one by small moves of the markers only. Blur, dot
+// gain or shifts of inks that have changed, bending that was not drawn, and markers that scatter are drawn
+// otherwise.
 bool is_settled(const PatternState& before, const Estimate& after, const SynthesisStep& step,
                 const layout::Topology& topology, const StepsLimits& limits) {
-  const double change_px = std::abs(step.sigma - before.sigma) + std::abs(step.dot_gain - before.dot_gain);
+  const double change_px = std::abs(step.sigma - before.sigma) + std::abs(step.dot_gain - before.dot_gain) +
+                           step.edge_px * largest_change(step.ink_shift, before.ink_shift);
   if (change_px >= limits.small_change * before.sigma) return false;
   const auto& diagonal = step.solution.information.diagonal;
   const auto bend = before.bend.flat();
@@ -58,8 +68,16 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
   const UnevenDotGain uneven = measure_uneven_dot_gain(
       sums, gradients, contrasts, state.xy, topology, static_cast<double>(view.image.size(1)),
       static_cast<double>(view.image.size(0)), limits.dot_gain);
-  Array<double, 1> dot_gain_offset =
-      update_without_dot_gain(sums, gradients, contrasts, edge_cells, dot_gain);
+  Array<double, 1> dot_gain_offset = dot_gain_offsets(sums, contrasts, edge_cells, dot_gain);
+  // the round of profiles tells whether inks lie off
+  const auto drawn = state.ink_shift.flat();
+  const bool is_shifted = std::any_of(drawn.begin(), drawn.end(), [](double value) { return value != 0.0; });
+  Array<double, 2> ink_shift = is_shifted ? measure_ink_shift(sums, gradients, lines, state.ink_shift,
+                                                              state.maps, sigma, topology, limits.ink_shift)
+                                          : Array<double, 2>(state.ink_shift);
+  update_without_offsets(sums, gradients, dot_gain_offset);
+  update_without_ink_shift(sums, gradients, lines, state.ink_shift, ink_shift, state.maps, topology);
+  GridlinesBetween between = gridlines_between(ink_shift, lines, state.maps, topology);
   EliminatedBending bent = update_for_bending(
       sums, gradients, {state.bend, state.roughness, state.weight, state.scatter, topology.scatter_bending},
       lines, edges, state.noise, rule, limits.step);
@@ -81,6 +99,8 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
                         std::move(weighed.weight),
                         std::move(solved.variance_ratio),
                         std::move(dot_gain_offset),
+                        std::move(between.offset),
+                        std::move(between.variance),
                         sigma,
                         noise};
   return {std::move(reading),
@@ -88,6 +108,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
           std::move(bent.variance),
           dot_gain,
           uneven,
+          std::move(ink_shift),
           blur_px,
           std::move(after),
           std::move(is_read),
@@ -102,13 +123,14 @@ Estimate synthesis_steps(const image::PyramidLevel& view, const layout::Topology
   SteppedMarkers markers{first.measured, first.reliable, first.information};
   View<const double, 2> bend = first.bend;
   View<const double, 1> weight = first.weight;
+  View<const double, 2> ink_shift = first.ink_shift;
   InkLevels levels = first.levels;
   double sigma = first.sigma, noise = first.noise, dot_gain = first.dot_gain;
   Estimate out;
   for (Index n = 0; n < limits.max_steps; ++n) {
     MovedPattern drawn = move_pattern(markers, topology, limits.step.step);
-    const PatternState state{drawn.xy, drawn.hidden, drawn.maps, drawn.roughness, bend,
-                             weight,   sigma,        noise,      dot_gain,        drawn.scatter};
+    const PatternState state{drawn.xy, drawn.hidden, drawn.maps, drawn.roughness, bend,         weight,
+                             sigma,    noise,        dot_gain,   ink_shift,       drawn.scatter};
     SynthesisStep step = synthesis_step(view, topology, picture, state, levels, stations, limits.step);
     const double ratio = sigma / step.edge_px;
     StepRemainder rest = step_remainder(step.solution.measured, drawn.xy, shift, sigma,
@@ -122,12 +144,13 @@ Estimate synthesis_steps(const image::PyramidLevel& view, const layout::Topology
     out.reading = std::move(step.reading);
     out.sigma = step.sigma, out.noise = out.reading.noise, out.dot_gain = step.dot_gain;
     out.uneven_dot_gain = step.uneven_dot_gain;
+    out.ink_shift = std::move(step.ink_shift);
     out.levels = std::move(step.levels);
     out.convergence_cov_px2 = std::move(rest.cov_px2);
     if (is_last) break;
     markers = {out.solution.measured, out.solution.reliable, out.solution.information};
     bend = out.solution.bend, weight = out.reading.weight, levels = levels_of(out.levels);
-    sigma = out.sigma, noise = out.noise, dot_gain = out.dot_gain;
+    sigma = out.sigma, noise = out.noise, dot_gain = out.dot_gain, ink_shift = out.ink_shift;
   }
   return out;
 }

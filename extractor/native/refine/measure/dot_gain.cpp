@@ -121,15 +121,21 @@ UnevenDotGain measure_uneven_dot_gain(View<const double, 2> sums, const ShiftGra
   return {std::sqrt(squares[3]), std::sqrt(squares[1] + squares[2])};
 }
 
-Array<double, 1> update_without_dot_gain(View<double, 2> sums, ShiftGradients& gradients,
-                                         View<const double, 2> contrasts,
-                                         View<const std::int32_t, 2> edge_cells, double dot_gain) {
-  Array<double, 1> shift({sums.size()}, 0.0);
-  if (dot_gain == 0.0) return shift;
+Array<double, 1> dot_gain_offsets(View<const double, 2> sums, View<const double, 2> contrasts,
+                                  View<const std::int32_t, 2> edge_cells, double dot_gain) {
+  Array<double, 1> out({sums.size()}, 0.0);
+  if (dot_gain == 0.0) return out;
+  for (Index e = 0; e < sums.size(); ++e) {
+    if (sums(e, AA) != 0.0) out[e] = dot_gain * outward_sign(contrasts, edge_cells, e);
+  }
+  return out;
+}
+
+void update_without_offsets(View<double, 2> sums, ShiftGradients& gradients, View<const double, 1> offset) {
   for (Index e = 0; e < sums.size(); ++e) {
     const auto own = sums[e];
-    if (own[AA] == 0.0) continue;
-    const double off = dot_gain * outward_sign(contrasts, edge_cells, e);
+    const double off = offset[e];
+    if (off == 0.0 || own[AA] == 0.0) continue;
     const double by_a = own[AA] + own[AB], by_b = own[AB] + own[BB];
     double &start = gradients.start[e], &end = gradients.end[e];
     own[MISFIT] -= off * (2.0 * (start + end) - off * (by_a + by_b));
@@ -137,9 +143,7 @@ Array<double, 1> update_without_dot_gain(View<double, 2> sums, ShiftGradients& g
     end -= off * by_b;
     own[C] -= off * (own[AC] + own[BC]);
     own[D] -= off * (own[AD] + own[BD]);
-    shift[e] = off;
   }
-  return shift;
 }
 
 Array<double, 2> markers_without_dot_gain(View<const double, 2> xy, View<const std::int32_t, 2> cells,

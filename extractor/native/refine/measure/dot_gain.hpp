@@ -50,12 +50,12 @@ UnevenDotGain measure_uneven_dot_gain(View<const double, 2> sums, const ShiftGra
                                       const layout::Topology& topology, double width, double height,
                                       const DotGainLimits& limits);
 
-// Removes a dot gain, px, from the gridlines' sums (E, 24) and gradients, in place.
-//
-// (E,) px, the shift of each gridline along its normal by the dot gain.
-Array<double, 1> update_without_dot_gain(View<double, 2> sums, ShiftGradients& gradients,
-                                         View<const double, 2> contrasts,
-                                         View<const std::int32_t, 2> edge_cells, double dot_gain);
+// (E,) px, the shift of each gridline along its normal by the dot gain, px; sums (E, 24).
+Array<double, 1> dot_gain_offsets(View<const double, 2> sums, View<const double, 2> contrasts,
+                                  View<const std::int32_t, 2> edge_cells, double dot_gain);
+
+// Removes shifts (E,) px of the gridlines along their normals from their sums (E, 24) and gradients.
+void update_without_offsets(View<double, 2> sums, ShiftGradients& gradients, View<const double, 1> offset);
 
 // (M, 2) px: markers xy, which are means of the corners of the enlarged cells (K, 3), moved back inward.
 Array<double, 2> markers_without_dot_gain(View<const double, 2> xy, View<const std::int32_t, 2> cells,

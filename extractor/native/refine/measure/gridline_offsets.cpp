@@ -93,10 +93,11 @@ Array<double, 3> virtual_markers(const GridlineReading& reading, double scale, c
     const double ux = line[UX], uy = line[UY], length = line[LENGTH];
     for (Index j = 0; j < count; ++j) {
       const double t = (static_cast<double>(j) + 1.0) / (static_cast<double>(count) + 1.0);
-      const double off = sagitta(t, length, line[LEAVE], line[ARRIVE]) + offsets(e, j, OFFSET);
+      const double off =
+          sagitta(t, length, line[LEAVE], line[ARRIVE]) + offsets(e, j, OFFSET) - reading.ink_offset[e];
       out(e, j, 0) = (line[X] + t * length * ux - off * uy + 0.5) * scale - 0.5;
       out(e, j, 1) = (line[Y] + t * length * uy + off * ux + 0.5) * scale - 0.5;
-      out(e, j, 2) = offsets(e, j, VARIANCE) * scale * scale;
+      out(e, j, 2) = (offsets(e, j, VARIANCE) + reading.ink_variance[e]) * scale * scale;
     }
   }
   return out;

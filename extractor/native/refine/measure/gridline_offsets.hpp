@@ -28,11 +28,13 @@ struct GridlineReading {
   View<const double, 1> weight;           // (E,) 0 to 1
   View<const double, 1> variance_ratio;   // (E,), as variance_ratios gives it
   View<const double, 1> dot_gain_offset;  // (E,) px, the shift of the gridline towards (-uy, ux) by dot gain
-  double sigma;                           // px, the blur
-  double noise;                           // gray levels
+  View<const double, 1> ink_offset;    // (E,) px, towards (-uy, ux), from the stated gridline to the seen one
+  View<const double, 1> ink_variance;  // (E,) px^2, of the stated gridline, which covers the seen one
+  double sigma;                        // px, the blur
+  double noise;                        // gray levels
 
   CMP_RECORD("extractor.refine.estimate.GridlineReading", lines, contrasts, station_sums, weight,
-             variance_ratio, dot_gain_offset, sigma, noise)
+             variance_ratio, dot_gain_offset, ink_offset, ink_variance, sigma, noise)
 };
 
 // The offsets of the gridlines around their m virtual markers.
