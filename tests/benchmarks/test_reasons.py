@@ -15,7 +15,8 @@ from extractor import Extractor, Markers, Reason, parse_layout
 
 SUITES = ("provoking", "damage", "stress", "camera", "views")
 PICTURES = 40  # of each suite
-OWN_PATTERN = {Reason.REFERENCE_LOST, Reason.AMBIGUOUS, Reason.MIRRORED}
+# where a pattern is seen; of a pale one that is numbered, no marker may be sure enough
+OWN_PATTERN = {Reason.REFERENCE_LOST, Reason.AMBIGUOUS, Reason.MIRRORED, Reason.FEW_MARKERS}
 
 
 def read_kept(picture: KeptPicture) -> Markers:

@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.scenes import standard_layout
 from benchmarks.suites.scoring.calibration import Calibration, squared_distances, summarise
-from benchmarks.suites.scoring.reading import cached_extractor, cached_layout
+from benchmarks.suites.scoring.reading import cached_extractor
 from cmpdesign.patterns.colors import BLACK
 from extractor import Markers, Status, VirtualStatus
 
@@ -39,7 +40,7 @@ class Shot(NamedTuple):
 @cache
 def shot() -> Shot:
     """Drawn with polygons in eight times the size, one cell over the other; noise of 1.5 gray levels."""
-    layout = cached_layout("honeycomb", LAYERS)
+    layout = standard_layout("honeycomb", LAYERS)
     pitch_mm = np.linalg.norm(layout.marker_xy_mm[1] - layout.marker_xy_mm[0])
     turn = np.array([(0.98, 0.2), (0.2, -0.98)]) * PITCH_PX / pitch_mm
     xy = layout.marker_xy_mm @ turn.T + 0.5 * np.array(SIZE_PX)
@@ -78,7 +79,7 @@ def test_markers_lie_between_their_two_places_and_the_covariance_covers_both() -
 
 def test_points_of_gridlines_lie_between_the_markers_gridline_and_the_seen_one() -> None:
     found, agreed, _ = shot()
-    layout = cached_layout("honeycomb", LAYERS)
+    layout = standard_layout("honeycomb", LAYERS)
     ends = agreed[layout.edges]
     share = (np.arange(layout.virtual_per_edge) + 1) / (layout.virtual_per_edge + 1)
     joined = ends[:, :1] + share[:, None] * (ends[:, 1:] - ends[:, :1])
@@ -86,4 +87,5 @@ def test_points_of_gridlines_lie_between_the_markers_gridline_and_the_seen_one()
     error = (found.virtual_xy_px - joined)[mine]
     calibration = summarise([squared_distances(error, found.virtual_cov_px2[mine])])
     assert mine.mean() > 0.9
+    assert np.linalg.norm(error, axis=1).mean() < 0.7  # 1.07 of the seen gridlines
     assert 0.6 < calibration.z.value < 1.2 and calibration.beyond.value < 0.01
