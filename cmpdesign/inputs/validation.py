@@ -8,6 +8,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from cmpdesign.inputs.names import nearest_name
+from cmpdesign.inputs.texts import visible
 
 MAX_ERRORS = 5
 _MAX_VALUE_LETTERS = 60
@@ -43,7 +44,7 @@ def shown_value(value: object) -> str:
 
 
 def _item_message(item: Any, model: type[BaseModel]) -> str:
-    path = ".".join(str(part) for part in item["loc"])
+    path = ".".join(visible(str(part)) for part in item["loc"])
     message, kind = item["msg"].removeprefix("Value error, "), item["type"]
     if kind == "extra_forbidden":
         return f"{path} is unknown{nearest_name(item['loc'][-1], _known_names(model, item['loc'][:-1]))}"

@@ -437,4 +437,5 @@ def _uncertain_reason(placed: PlacedPart) -> Reason:
     whites = np.count_nonzero(white[close] > 0.0) + placed.other_whites
     if whites > 1:
         return Reason.SEVERAL_PADS
-    return Reason.AMBIGUOUS if np.count_nonzero(white[close] > 0.0) > 1 else Reason.REFERENCE_LOST
+    may_be_white = (white[close] >= 0.0) & (placed.motions.known_white[close] > 0)
+    return Reason.AMBIGUOUS if np.count_nonzero(may_be_white) > 1 else Reason.REFERENCE_LOST

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from cmpdesign import CmpDesignError
@@ -327,6 +327,7 @@ JSON_VALUES = st.recursive(
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@example(name="inputs", value={"\n": None})
 @given(
     name=st.sampled_from(["frames", "seed", "designs", "inputs", "image", "markers", "scene"]),
     value=JSON_VALUES,

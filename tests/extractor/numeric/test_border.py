@@ -44,5 +44,5 @@ def test_what_is_written_must_be_writable() -> None:
     assert fill_patch_mean(image, 20, 20, 9.0, 9.0, 2.0, out)
     np.testing.assert_allclose(out, 7)
     out.setflags(write=False)
-    with pytest.raises(TypeError, match="out is no array that can be written"):
+    with pytest.raises(TypeError, match="out cannot be written"):
         fill_patch_mean(image, 20, 20, 9.0, 9.0, 2.0, out)
