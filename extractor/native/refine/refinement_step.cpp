@@ -8,12 +8,6 @@ namespace cmp::refine {
 
 namespace {
 
-template <int N>
-bool has_any(View<const double, N> values) {
-  const auto all = values.flat();
-  return std::any_of(all.begin(), all.end(), [](double value) { return value != 0.0; });
-}
-
 // The equations of a step for the shifts of the markers.
 struct Equations {
   const GridlineSystem& system;

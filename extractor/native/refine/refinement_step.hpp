@@ -2,6 +2,7 @@
 // markers.
 #pragma once
 
+#include <algorithm>
 #include <tuple>
 
 #include "base/array.hpp"
@@ -34,6 +35,13 @@ struct StepLimits {
   GridlineLimits gridlines;
   ScatterLimits scatter;
 };
+
+// Whether any value is not zero.
+template <int N>
+bool has_any(View<const double, N> values) {
+  const auto all = values.flat();
+  return std::any_of(all.begin(), all.end(), [](double value) { return value != 0.0; });
+}
 
 // The bending of the gridlines as it was eliminated.
 struct EliminatedBending {

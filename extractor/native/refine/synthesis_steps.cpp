@@ -1,6 +1,5 @@
 #include "refine/synthesis_steps.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -37,8 +36,7 @@ bool is_settled(const PatternState& before, const Estimate& after, const Synthes
                            step.edge_px * largest_change(step.ink_shift, before.ink_shift);
   if (change_px >= limits.small_change * before.sigma) return false;
   const auto& diagonal = step.solution.information.diagonal;
-  const auto bend = before.bend.flat();
-  const bool is_bent = std::any_of(bend.begin(), bend.end(), [](double own) { return own != 0.0; });
+  const bool is_bent = has_any(before.bend);
   if (!is_bent && typical_bending(step.solution.bend, step.is_read, diagonal) >= limits.small_bend)
     return false;
   const auto scatter =
@@ -70,8 +68,7 @@ SynthesisStep synthesis_step(const image::PyramidLevel& view, const layout::Topo
       static_cast<double>(view.image.size(0)), limits.dot_gain);
   Array<double, 1> dot_gain_offset = dot_gain_offsets(sums, contrasts, edge_cells, dot_gain);
   // the round of profiles tells whether inks lie off
-  const auto drawn = state.ink_shift.flat();
-  const bool is_shifted = std::any_of(drawn.begin(), drawn.end(), [](double value) { return value != 0.0; });
+  const bool is_shifted = has_any(state.ink_shift);
   Array<double, 2> ink_shift = is_shifted ? measure_ink_shift(sums, gradients, lines, state.ink_shift,
                                                               state.maps, sigma, topology, limits.ink_shift)
                                           : Array<double, 2>(state.ink_shift);
