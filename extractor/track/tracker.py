@@ -173,7 +173,7 @@ class Tracker:
             return markers, None
         if self._tables is not None and pyramid is not None:
             view = self._level_of_check(pyramid, markers.xy_px)
-            cells = seen_cells(pyramid.level(1), view, markers.xy_px, self._tables)
+            cells = seen_cells(view, markers.xy_px, self._tables)
             count = int((markers.status == Status.MEASURED).sum())
             self._update_state(markers, appearance, cells, count, 0)
             markers = self._settle(pyramid, markers)
@@ -224,9 +224,7 @@ class Tracker:
         if count < MIN_KEPT_SHARE * state.expected_count:
             return None
         expected, age = max(count, state.expected_count), state.frames_since_cold + 1
-        view = self._level_of_check(pyramid, markers.xy_px)
-        shift_px = native.resting_shifts(view, markers.xy_px, tables, start.levels)
-        cells = SeenCells(start.levels, start.light, shift_px)
+        cells = SeenCells(start.levels, start.light, start.ink_px)
         self._update_state(markers, appearance, cells, expected, age)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 

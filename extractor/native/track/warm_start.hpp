@@ -50,10 +50,10 @@ struct TrackState {
 struct WarmStart {
   numbering::InitialMarkers places;
   Array<double, 3> levels;
-  Array<double, 2> light;
+  Array<double, 2> light, ink_px;
   bool by_rim;
 
-  CMP_RECORD("extractor.track.warm_start.WarmStart", places, levels, light, by_rim)
+  CMP_RECORD("extractor.track.warm_start.WarmStart", places, levels, light, ink_px, by_rim)
 };
 
 // The start from the last frame, in an image at the scale of the check; nothing where it does not prove one.

@@ -31,8 +31,7 @@ def test_levels_follow_the_light(gain: float) -> None:
         looks.append(read.appearance)
         pyramid = reader.pyramid(image)
         assert pyramid is not None
-        view = pyramid.level(1)
-        light.append(seen_cells(view, view, read.markers.xy_px, tables).light)
+        light.append(seen_cells(pyramid.level(1), read.markers.xy_px, tables).light)
     before, now = looks
     assert before is not None and now is not None
     relit = before.with_lighting(*light)
