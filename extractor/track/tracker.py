@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from extractor._native import track as native
 from extractor.contact import ContactForce
 from extractor.errors import ImageError
+from extractor.frozen_record import LateRecord
 from extractor.image.input import Channels
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response
@@ -22,7 +23,7 @@ from extractor.presets import Preset
 from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edge
 from extractor.result import Markers, Origin, Reason, Status
-from extractor.track.displacement import Rest, fit_rest
+from extractor.track.displacement import NO_REST, Rest, fit_rest
 from extractor.track.warm_start import SeenCells, TrackState, WarmStart, seen_cells
 from extractor.track.warm_tables import WarmTables, build_warm_tables
 
@@ -54,8 +55,8 @@ class StartKind(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
-    """The result of one frame.
+class Tracked(LateRecord):
+    """The result of one frame. Displacements are computed when they are first asked for.
 
     Attributes:
         index: place in the sequence, from 0.
@@ -260,16 +261,18 @@ class Tracker:
         markers: Markers,
         elapsed_ms: float,
     ) -> Tracked:
-        unknown = np.full_like(markers.xy_px, np.nan)
-        frame = Tracked(
+        rest = self.rest or NO_REST
+        frame = Tracked.with_later(
+            {
+                ("displacement_px",): lambda: [rest.displacement_px(markers.xy_px)],
+                ("displacement_mm",): lambda: [rest.displacement_mm(markers.xy_px)],
+            },
             index=self._count,
             time_s=time_s,
             status=status,
             reason=reason,
             start=start,
             markers=markers,
-            displacement_px=unknown if self.rest is None else self.rest.displacement_px(markers.xy_px),
-            displacement_mm=unknown if self.rest is None else self.rest.displacement_mm(markers.xy_px),
             elapsed_ms=elapsed_ms,
         )
         self._count += 1
