@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -119,17 +119,9 @@ class RefinedMarkers:
         """
         return measure.virtual_markers(self.reading, self.appearance.scale)
 
-
-class UnevenDotGain(NamedTuple):
-    """Changes of the dot gain over the image beyond what noise explains, px/px, 0 or more.
-
-    Attributes:
-        outward: with the distance from the image's middle.
-        across: from one side of the image to the other.
-    """
-
-    outward: float
-    across: float
+    def with_parallax(self, parallax: Parallax) -> RefinedMarkers:
+        """The same with another parallax of the cells."""
+        return replace(self, appearance=self.appearance._replace(parallax=parallax))
 
 
 class EdgeContrasts(NamedTuple):
@@ -197,26 +189,3 @@ class FirstEstimate(NamedTuple):
             levels=self.levels._replace(slope=self.levels.slope / ratio),
             contrasts=self.contrasts._replace(clearance=clearance),
         )
-
-
-class MeasuredImage(NamedTuple):
-    """The markers after the steps by synthesis, and what the image then shows.
-
-    Attributes:
-        xy_px, cov_px2, explained, reading: as in ``RefinedMarkers``.
-        sigma: the blur, px at the scale of the steps.
-        noise, pixel_noise, levels: as in ``Appearance``.
-        uneven_dot_gain: changes of the dot gain over the image.
-        scatter: of the markers, at the scale of the steps.
-    """
-
-    xy_px: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
-    explained: NDArray[np.bool_]
-    reading: GridlineReading
-    sigma: float
-    noise: float
-    pixel_noise: float
-    levels: InkLevels
-    uneven_dot_gain: UnevenDotGain
-    scatter: MarkerScatter
