@@ -40,19 +40,6 @@ class Appearance(NamedTuple):
     pixel_noise: float
     parallax: Parallax | None = None
 
-    def with_lighting(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Appearance:
-        """The appearance in another light.
-
-        Args:
-            before, now: (2, 3) mean light of some cells over black, and of their black, in the previous and in the
-                present image.
-        """
-        gain = now[0] / np.maximum(before[0], 1e-9)
-        black = self.levels.black.copy()
-        black[:, 0] += now[1] - before[1]
-        cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
-        return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
-
     def is_similar(self, other: Appearance) -> bool:
         """Whether blur and levels are nearly the same."""
         blur = abs(self.sigma - other.sigma) < MAX_BLUR_CHANGE * other.sigma

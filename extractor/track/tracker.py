@@ -166,7 +166,7 @@ class Tracker:
         if warm is not None:
             return warm
         markers, appearance = self._reader.read_pyramid(pyramid, stages)
-        if not markers.found:
+        if not markers.found or appearance is None:
             if (
                 self._state is not None
             ):  # the next frame may start from these positions, but not from velocities
@@ -219,10 +219,10 @@ class Tracker:
         numbered = NumberedMarkers(
             start.places, state.mirrored, Origin.PREVIOUS if start.by_rim else Origin.WHITE
         )
-        before = state.appearance and state.appearance.with_lighting(state.cells.light, start.light)
+        before = state.appearance._replace(levels=start.ink_levels)
         markers, appearance = self._reader.finish(pyramid, numbered, stages, before)
         count = int((markers.status == Status.MEASURED).sum())
-        if count < MIN_KEPT_SHARE * state.expected_count:
+        if appearance is None or count < MIN_KEPT_SHARE * state.expected_count:
             return None
         expected, age = max(count, state.expected_count), state.frames_since_cold + 1
         cells = SeenCells(start.levels, start.light, start.ink_px)
@@ -232,13 +232,13 @@ class Tracker:
     def _update_state(
         self,
         markers: Markers,
-        appearance: Appearance | None,
+        appearance: Appearance,
         cells: SeenCells,
         expected_count: int,
         frames_since_cold: int,
     ) -> None:
         last = self._state
-        if appearance is not None and last is not None and last.appearance is not None:
+        if last is not None:
             # cells above or below the black: the parallax of the first frame, also after a cold start
             appearance = appearance._replace(parallax=last.appearance.parallax)
         self._state = TrackState(

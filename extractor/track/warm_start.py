@@ -11,6 +11,7 @@ from extractor._native import track as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.estimate import Appearance
+from extractor.refine.synthesis.ink_levels import InkLevels
 from extractor.track.warm_tables import WarmTables
 
 
@@ -36,7 +37,7 @@ class TrackState(NamedTuple):
         known: (M,) bool, the measured markers.
         previous_px: (M, 2) float64, the markers of the previous frame; None where that frame was lost.
         cells: as the frame shows them.
-        appearance: of the image, for refinement; None where no pattern was found.
+        appearance: of the image, for refinement.
         mirrored: the image shows the pattern's back.
         expected_count: largest number of measured markers since the last cold start.
         frames_since_cold: number of frames since the last cold start.
@@ -47,7 +48,7 @@ class TrackState(NamedTuple):
     known: NDArray[np.bool_]
     previous_px: NDArray[np.float64] | None
     cells: SeenCells
-    appearance: Appearance | None
+    appearance: Appearance
     mirrored: bool
     expected_count: int
     frames_since_cold: int
@@ -60,6 +61,7 @@ class WarmStart(NamedTuple):
     Attributes:
         places: the markers before refinement.
         levels, light, ink_px: as in ``SeenCells``; of cells that are not proved, the levels of the previous frame.
+        ink_levels: those of the previous frame's appearance, in the light of this frame.
         by_rim: the white cell is hidden, and the rim proved the numbering.
     """
 
@@ -67,6 +69,7 @@ class WarmStart(NamedTuple):
     levels: NDArray[np.float64]
     light: NDArray[np.float64]
     ink_px: NDArray[np.float64]
+    ink_levels: InkLevels
     by_rim: bool
 
 

@@ -187,6 +187,24 @@ FoundInks align_to_inks(const image::PyramidLevel& view, Array<double, 2> predic
   return found;
 }
 
+// The inks' levels in another light: before and now (2, 3), mean light of some cells over black, and of their
+// black, in the previous and in the present image.
+refine::LevelArrays levels_in_light(const refine::InkLevels& levels, View<const double, 2> before,
+                                    View<const double, 2> now) {
+  constexpr double TINY = 1e-9;  // keeps a division finite
+  refine::LevelArrays out{Array<double, 2>(levels.cell), Array<double, 3>(levels.slope),
+                          Array<double, 2>(levels.black), Array<bool, 1>(levels.is_outlier)};
+  for (Index channel = 0; channel < 3; ++channel) {
+    const double gain = now(0, channel) / std::max(before(0, channel), TINY);
+    out.black(channel, 0) += now(1, channel) - before(1, channel);
+    for (Index i = 0; i < out.cell.size(); ++i) {
+      out.cell(i, channel) *= gain;
+      for (Index axis = 0; axis < 2; ++axis) out.slope(i, channel, axis) *= gain;
+    }
+  }
+  return out;
+}
+
 // Whether the white cell is where the layout has it, and nowhere else; where it is hidden, whether the whole
 // rim is confirmed.
 bool is_white_right(const CellCheck& check, View<const bool, 1> is_rim, const WarmStartLimits& limits) {
@@ -220,8 +238,13 @@ std::optional<WarmStart> warm_start(const image::PyramidLevel& view, const Track
     }
   }
   Array<double, 2> light = mean_light(check.cell_levels, view.response.light);
-  return WarmStart{verified_markers(view, aligned, proved, tables.corners), std::move(check.cell_levels),
-                   std::move(light), view.to_full_scale(centroid), by_rim};
+  auto ink_levels = levels_in_light(state.appearance.levels, state.cells.light, light);
+  return WarmStart{verified_markers(view, aligned, proved, tables.corners),
+                   std::move(check.cell_levels),
+                   std::move(light),
+                   view.to_full_scale(centroid),
+                   std::move(ink_levels),
+                   by_rim};
 }
 
 }  // namespace cmp::track
