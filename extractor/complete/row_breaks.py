@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
-from extractor.refine.estimate import RefinedMarkers
 from extractor.refine.extrapolated_pattern import extrapolate_pattern
 from extractor.result import Status
 
@@ -112,17 +111,15 @@ NO_BREAK = RowBreak("", 0.0, np.empty(0), np.empty(0), 0.0)
 
 
 def find_row_break(
-    topology: Topology, refined: RefinedMarkers, markers: RepairedMarkers, size_px: tuple[int, int]
+    topology: Topology, jumps: StripJumps, markers: RepairedMarkers, size_px: tuple[int, int]
 ) -> RowBreak:
     """The break of an image along its rows.
 
     Args:
         topology: of the layout.
-        refined: the markers of the image before inconsistent ones were dropped: a break makes them inconsistent.
-        markers: of the image.
+        jumps, markers: of the image.
         size_px: width and height of the image.
     """
-    jumps = native.measure_jumps(refined.xy_px, topology)
     edge, largest = jumps.edge_px, jumps.largest_px
     if edge == 0:
         return NO_BREAK

@@ -68,9 +68,9 @@ class Parallax(NamedTuple):
 
     def cov_px2(self, xy_px: Points) -> Points:
         """(N, 2, 2) of the shift at points (N, 2)."""
-        away = xy_px - self.foot_px
-        along = away[:, :, None] * away[:, None, :]
-        return self.rate_deviation**2 * (along + self.foot_cov_px2) + self.rate**2 * self.foot_cov_px2
+        away = self.rate_deviation * (xy_px - self.foot_px)
+        of_foot = (self.rate_deviation**2 + self.rate**2) * self.foot_cov_px2
+        return away[:, :, None] * away[:, None, :] + of_foot
 
 
 def find_parallax(topology: Topology, xy_px: Points, points_px: Points, size_px: Points) -> Parallax:

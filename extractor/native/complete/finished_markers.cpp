@@ -1,0 +1,17 @@
+#include "complete/finished_markers.hpp"
+
+namespace cmp::complete {
+
+FinishedMarkers finish_markers(const image::PyramidLevel& view, const RefinedMarkers& refined,
+                               const refine::StartPlaces& places, const layout::RingTables& tables,
+                               const layout::Topology& topology, const SampledCells& cells,
+                               const FinishLimits& limits) {
+  const ImageSize size{view.image.size(1), view.image.size(0)};
+  RepairedMarkers repaired = repair_markers(refined, places, tables, size, limits.repair);
+  StripJumps jumps = measure_jumps(refined.xy_px, topology, limits.jumps);
+  const auto [figures, noise, edge_px] =
+      measure_numbered(view, cells, repaired.xy_px, topology.edges, limits.quality);
+  return {std::move(repaired), std::move(jumps), figures, noise, edge_px};
+}
+
+}  // namespace cmp::complete
