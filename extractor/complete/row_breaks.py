@@ -170,8 +170,8 @@ def _lost_along_a_row(
     topology: Topology, markers: RepairedMarkers, size_px: tuple[int, int], edge: float
 ) -> RowBreak:
     """A tear beside which no marker is reported, across the whole pattern; nothing is lost so along a column."""
-    known = markers.status == Status.MEASURED
-    if np.count_nonzero(~known) < LIMITS.min_lost:
+    known = markers.status == Status.MEASURED.value
+    if len(known) - np.count_nonzero(known) < LIMITS.min_lost:
         return NO_BREAK
     xy = np.where(known[:, None], markers.xy_px, np.nan)
     place = np.where(known[:, None], xy, extrapolate_pattern(xy, topology).xy)

@@ -175,8 +175,7 @@ class Tracker:
         if self._tables is not None and pyramid is not None:
             view = self._level_of_check(pyramid, markers.xy_px)
             cells = seen_cells(view, markers.xy_px, self._tables)
-            count = int((markers.status == Status.MEASURED).sum())
-            self._update_state(markers, appearance, cells, count, 0)
+            self._update_state(markers, appearance, cells, _measured(markers), None)
             markers = self._settle(pyramid, markers)
         return markers, StartKind.COLD
 
@@ -221,12 +220,10 @@ class Tracker:
         )
         before = state.appearance._replace(levels=start.ink_levels)
         markers, appearance = self._reader.finish(pyramid, numbered, stages, before)
-        count = int((markers.status == Status.MEASURED).sum())
-        if appearance is None or count < MIN_KEPT_SHARE * state.expected_count:
+        known = _measured(markers)
+        if appearance is None or np.count_nonzero(known) < MIN_KEPT_SHARE * state.expected_count:
             return None
-        expected, age = max(count, state.expected_count), state.frames_since_cold + 1
-        cells = SeenCells(start.levels, start.light, start.ink_px)
-        self._update_state(markers, appearance, cells, expected, age)
+        self._update_state(markers, appearance, start.cells, known, state)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
     def _update_state(
@@ -234,22 +231,23 @@ class Tracker:
         markers: Markers,
         appearance: Appearance,
         cells: SeenCells,
-        expected_count: int,
-        frames_since_cold: int,
+        known: NDArray[np.bool_],
+        start: TrackState | None,
     ) -> None:
-        last = self._state
+        """Keep a frame; start is the state that it started from, None for a cold start."""
+        last, count = self._state, int(np.count_nonzero(known))
         if last is not None:
             # cells above or below the black: the parallax of the first frame, also after a cold start
             appearance = appearance._replace(parallax=last.appearance.parallax)
         self._state = TrackState(
             xy_px=markers.xy_px,
-            known=markers.status == Status.MEASURED,
+            known=known,
             previous_px=last.xy_px if last is not None and not last.is_before_gap else None,
             cells=cells,
             appearance=appearance,
             mirrored=bool(markers.mirrored),
-            expected_count=expected_count,
-            frames_since_cold=frames_since_cold,
+            expected_count=count if start is None else max(count, start.expected_count),
+            frames_since_cold=0 if start is None else start.frames_since_cold + 1,
         )
 
     def _make_tracked(
@@ -282,3 +280,8 @@ class Tracker:
         height, width = np.shape(image)[:2]
         assert self._size is not None
         return f"{width} x {height} px instead of {self._size[1]} x {self._size[0]} px"
+
+
+def _measured(markers: Markers) -> NDArray[np.bool_]:
+    """(M,) the markers that are measured."""
+    return np.asarray(markers.status == Status.MEASURED.value)

@@ -60,15 +60,13 @@ class WarmStart(NamedTuple):
 
     Attributes:
         places: the markers before refinement.
-        levels, light, ink_px: as in ``SeenCells``; of cells that are not proved, the levels of the previous frame.
+        cells: as this frame shows them; of those that are not proved, the levels of the previous frame.
         ink_levels: those of the previous frame's appearance, in the light of this frame.
         by_rim: the white cell is hidden, and the rim proved the numbering.
     """
 
     places: InitialMarkers
-    levels: NDArray[np.float64]
-    light: NDArray[np.float64]
-    ink_px: NDArray[np.float64]
+    cells: SeenCells
     ink_levels: InkLevels
     by_rim: bool
 

@@ -240,9 +240,7 @@ std::optional<WarmStart> warm_start(const image::PyramidLevel& view, const Track
   Array<double, 2> light = mean_light(check.cell_levels, view.response.light);
   auto ink_levels = levels_in_light(state.appearance.levels, state.cells.light, light);
   return WarmStart{verified_markers(view, aligned, proved, tables.corners),
-                   std::move(check.cell_levels),
-                   std::move(light),
-                   view.to_full_scale(centroid),
+                   {std::move(check.cell_levels), std::move(light), view.to_full_scale(centroid)},
                    std::move(ink_levels),
                    by_rim};
 }

@@ -51,12 +51,11 @@ struct TrackState {
 // A proved start; the Python class explains the fields.
 struct WarmStart {
   numbering::InitialMarkers places;
-  Array<double, 3> levels;
-  Array<double, 2> light, ink_px;
+  SeenCellsArrays cells;
   refine::LevelArrays ink_levels;
   bool by_rim;
 
-  CMP_RECORD("extractor.track.warm_start.WarmStart", places, levels, light, ink_px, ink_levels, by_rim)
+  CMP_RECORD("extractor.track.warm_start.WarmStart", places, cells, ink_levels, by_rim)
 };
 
 // The start from the last frame, in an image at the scale of the check; nothing where it does not prove one.
