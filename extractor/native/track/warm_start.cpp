@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "numbering/marker_places.hpp"
-#include "numeric/bilinear.hpp"
+#include "numeric/bilinear_batch.hpp"
 #include "track/image_check.hpp"
 
 namespace cmp::track {
@@ -13,7 +13,7 @@ namespace cmp::track {
 namespace {
 
 // Whether the color (3,) of the middle of cell i matches its own ink better than the two others.
-bool has_own_ink(const std::array<double, 3>& color, Index i, const WarmTables& tables,
+bool has_own_ink(View<const double, 1> color, Index i, const WarmTables& tables,
                  View<const double, 2> levels, double min_strength) {
   const auto norm = [](View<const double, 1> v) {
     return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -42,19 +42,17 @@ struct VisibleCells {
 VisibleCells count_matching_centres(View<const std::uint8_t, 3> image, View<const double, 2> xy,
                                     const WarmTables& tables, View<const double, 2> levels,
                                     const WarmStartLimits& limits) {
-  const auto flat = image.flat();
-  const Index height = image.size(0), width = image.size(1);
-  std::array<double, 3> color{};
-  const View<double, 1> color_view(color.data(), {3});
+  Array<numeric::Patch, 1> patches({tables.corners.size()});
+  for (Index i = 0; i < patches.size(); ++i) {
+    const auto [x, y] = cell_middle(xy, tables.corners[i]);
+    patches[i] = {x, y, limits.centre_radius_px};
+  }
+  const Array<double, 2> colors = numeric::patch_means(image, patches);
   std::int64_t visible = 0, matching = 0;
-  for (Index i = 0; i < tables.corners.size(); ++i) {
-    const auto corners = tables.corners[i];
-    const auto a = xy[corners[0]], b = xy[corners[1]], c = xy[corners[2]];
-    const double x = (a[0] + b[0] + c[0]) / 3, y = (a[1] + b[1] + c[1]) / 3;
-    // outside the image, or NaN
-    if (!numeric::fill_patch_mean(flat, height, width, x, y, limits.centre_radius_px, color_view)) continue;
+  for (Index i = 0; i < colors.size(); ++i) {
+    if (colors(i, 3) == 0.0) continue;  // outside the image, or NaN
     ++visible;
-    matching += has_own_ink(color, i, tables, levels, limits.min_centre_strength);
+    matching += has_own_ink(colors[i], i, tables, levels, limits.min_centre_strength);
   }
   return {visible, matching};
 }
