@@ -28,7 +28,7 @@ from extractor.complete.image_quality import (
 )
 from extractor.complete.repair import RepairedMarkers
 from extractor.complete.reported_share import is_less_than_half_reported
-from extractor.complete.row_breaks import beside_row_break, find_row_break
+from extractor.complete.row_breaks import NO_BREAK, beside_row_break, find_row_break
 from extractor.complete.virtual_markers import locate_virtual_markers
 from extractor.errors import LayoutError
 from extractor.image.input import Channels, convert_to_bgr
@@ -289,7 +289,8 @@ class ImageReader:
         refined = stages.record("refine", pad.refiner(pyramid, places, before))
         full, cells = pyramid.level(1), pad.sampled_cells
         found = finish_markers(full, refined, places, pad.lattice, topology, cells)
-        rows = find_row_break(topology, found.jumps, found.repaired, size)
+        is_whole = found.are_all_measured and not found.jumps.is_broken
+        rows = NO_BREAK if is_whole else find_row_break(topology, found.jumps, found.repaired, size)
         apparent = beside_row_break(rows, found.repaired)
         parallax, repaired = refined.appearance.parallax, apparent
         if parallax is not None:
@@ -303,7 +304,9 @@ class ImageReader:
                 points = points_without_parallax(parallax, topology.edges, apparent.xy_px, points)
             return locate_virtual_markers(topology, repaired, points, refined.scatter)
 
-        few = is_less_than_half_reported(repaired.xy_px, layout.xy_mm, pad.lattice.present, size)
+        few = not is_whole and is_less_than_half_reported(
+            repaired.xy_px, layout.xy_mm, pad.lattice.present, size
+        )
         quality = quality_of(found.cells, found.noise, found.edge_px, refined.blur_px, rows)
         stages.record("quality", quality)
         markers = Markers.with_later(

@@ -24,6 +24,7 @@ class FinishedMarkers(NamedTuple):
         cells: the figures at the middles of the sampled cells.
         noise: standard deviation of one channel's noise, gray levels of 255.
         edge_px: median distance of neighbouring markers, px; NaN without any.
+        are_all_measured: every marker of the layout is.
     """
 
     repaired: RepairedMarkers
@@ -31,6 +32,7 @@ class FinishedMarkers(NamedTuple):
     cells: CellFigures
     noise: float
     edge_px: float
+    are_all_measured: bool
 
 
 def finish_markers(

@@ -14,7 +14,6 @@ Markers beside a break have a covariance that covers the jump, or are lost where
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,12 +32,6 @@ class RowBreakLimits(NamedTuple):
     """Limits of breaks. Lengths are in median edges, unless stated otherwise.
 
     Attributes:
-        min_jump: of a strip, for a break. Chosen: 0.4 px where an edge has 20.
-        ratio: of the largest jump along rows and that along columns. Chosen: pressed and twisted patterns have less
-            than 2.
-        min_usual_jump, usual_ratio: the same two limits of the RMS over all strips: where all rows are displaced, some
-            gridlines of the same picture jump along columns, too. Chosen: pictures with dirt, glare, motion blur and
-            scattered markers reach 0.03, or 2.1, but not both.
         spread, concentrated: a tear has this share of the squared jumps within that distance of their centre; else it
             is a rolling shutter. Chosen.
         beside: from the break, within which markers are not trusted. Chosen.
@@ -51,10 +44,6 @@ class RowBreakLimits(NamedTuple):
             that, the markers are covered and nothing is torn. Chosen.
     """
 
-    min_jump: float = 0.02
-    ratio: float = 3.0
-    min_usual_jump: float = 0.03
-    usual_ratio: float = 2.0
     spread: float = 2.0
     concentrated: float = 0.7
     beside: float = 0.75
@@ -78,16 +67,14 @@ class StripJumps(NamedTuple):
         edge_px: the median edge, 0 with few edges.
         rows_px: (B,) the length of the median jump of each strip of rows, beyond the disagreement of its gridlines; NaN
             with few gridlines.
-        largest_px, usual_px: the largest one, and the root mean square; NaN without any.
-        largest_column_px, usual_column_px: the same of strips of columns, with their disagreement.
+        largest_px: the largest one; NaN without any.
+        is_broken: rows jump more than columns do.
     """
 
     edge_px: float
     rows_px: Points
     largest_px: float
-    usual_px: float
-    largest_column_px: float
-    usual_column_px: float
+    is_broken: bool
 
 
 class RowBreak(NamedTuple):
@@ -121,12 +108,8 @@ def find_row_break(
         size_px: width and height of the image.
     """
     edge, largest = jumps.edge_px, jumps.largest_px
-    if edge == 0:
-        return NO_BREAK
-    is_one = largest > max(LIMITS.min_jump * edge, LIMITS.ratio * jumps.largest_column_px)
-    least = max(LIMITS.min_usual_jump * edge, LIMITS.usual_ratio * jumps.usual_column_px)
-    if math.isnan(jumps.largest_column_px) or not (is_one or jumps.usual_px > least):
-        return _lost_along_a_row(topology, markers, size_px, edge)
+    if not jumps.is_broken:
+        return NO_BREAK if edge == 0 else _lost_along_a_row(topology, markers, size_px, edge)
     rows = np.nan_to_num(jumps.rows_px)
     middle, squares = (np.arange(len(rows), dtype=np.float64) + 0.5) * native.STRIP_EDGES * edge, rows**2
     near = np.abs(middle - np.average(middle, weights=squares)) < LIMITS.spread * edge

@@ -11,7 +11,9 @@ FinishedMarkers finish_markers(const image::PyramidLevel& view, const RefinedMar
   StripJumps jumps = measure_jumps(refined.xy_px, topology, limits.jumps);
   const auto [figures, noise, edge_px] =
       measure_numbered(view, cells, repaired.xy_px, topology.edges, limits.quality);
-  return {std::move(repaired), std::move(jumps), figures, noise, edge_px};
+  bool are_all_measured = true;
+  for (const std::uint8_t status : repaired.status) are_all_measured = are_all_measured && status == MEASURED;
+  return {std::move(repaired), std::move(jumps), figures, noise, edge_px, are_all_measured};
 }
 
 }  // namespace cmp::complete

@@ -20,8 +20,10 @@ struct FinishedMarkers {
   StripJumps jumps;
   CellFigures cells;
   double noise, edge_px;
+  bool are_all_measured;
 
-  CMP_RECORD("extractor.complete.finished_markers.FinishedMarkers", repaired, jumps, cells, noise, edge_px)
+  CMP_RECORD("extractor.complete.finished_markers.FinishedMarkers", repaired, jumps, cells, noise, edge_px,
+             are_all_measured)
 };
 
 // view, the full image; cells, at which its quality is measured.

@@ -14,6 +14,9 @@
 
 namespace cmp::complete {
 
+// Status in extractor/result.py
+inline constexpr std::uint8_t LOST = 0, MEASURED = 1, REPAIRED = 2, FITTED = 3;
+
 // Limits of repaired markers. Distances and deviations are in edges, unless stated otherwise.
 //
 // The variance of a repaired marker has two parts. The stated errors of its neighbours are independent: each
