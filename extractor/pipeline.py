@@ -26,7 +26,6 @@ from extractor.complete.image_quality import (
     quality_of,
     sampled_cells,
 )
-from extractor.complete.repair import RepairedMarkers
 from extractor.complete.reported_share import is_less_than_half_reported
 from extractor.complete.row_breaks import NO_BREAK, beside_row_break, find_row_break
 from extractor.complete.virtual_markers import locate_virtual_markers
@@ -48,7 +47,7 @@ from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
-from extractor.refine.relief import points_without_parallax, without_parallax
+from extractor.refine.relief import points_without_parallax
 from extractor.result import VIRTUAL, Markers, Origin, Reason, VirtualMarkers
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
@@ -291,17 +290,13 @@ class ImageReader:
         found = finish_markers(full, refined, places, pad.lattice, topology, cells)
         is_whole = found.are_all_measured and not found.jumps.is_broken
         rows = NO_BREAK if is_whole else find_row_break(topology, found.jumps, found.repaired, size)
-        apparent = beside_row_break(rows, found.repaired)
-        parallax, repaired = refined.appearance.parallax, apparent
-        if parallax is not None:
-            flat = without_parallax(parallax, apparent.xy_px, apparent.cov_px2)
-            repaired = RepairedMarkers(*flat, apparent.status)
-        stages.record("repair", repaired)
+        repaired = stages.record("repair", beside_row_break(rows, found.repaired))
+        parallax = refined.appearance.parallax
 
         def virtual() -> VirtualMarkers:
             points = refined.points[:, : layout.virtual_per_edge]
             if parallax is not None:
-                points = points_without_parallax(parallax, topology.edges, apparent.xy_px, points)
+                points = points_without_parallax(parallax, topology.edges, repaired.xy_px, points)
             return locate_virtual_markers(topology, repaired, points, refined.scatter)
 
         few = not is_whole and is_less_than_half_reported(

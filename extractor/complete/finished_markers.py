@@ -19,7 +19,7 @@ class FinishedMarkers(NamedTuple):
     """The markers after repair, and the figures of their image.
 
     Attributes:
-        repaired: the markers.
+        repaired: the markers, in the plane of the black.
         jumps: of the refined markers before inconsistent ones were dropped: a break makes them inconsistent.
         cells: the figures at the middles of the sampled cells.
         noise: standard deviation of one channel's noise, gray levels of 255.

@@ -108,15 +108,10 @@ def find_parallax(topology: Topology, xy_px: Points, points_px: Points, size_px:
     return Parallax(foot + middle_px, cov, LIMITS.rate * height, LIMITS.rate_deviation * abs(height))
 
 
-def without_parallax(parallax: Parallax, xy_px: Points, cov_px2: Points) -> tuple[Points, Points]:
-    """Markers (M, 2) and covariances (M, 2, 2) in the plane of the black."""
-    return xy_px - parallax.shift_px(xy_px), cov_px2 + parallax.cov_px2(xy_px)
-
-
 def points_without_parallax(
     parallax: Parallax, edges: NDArray[np.int32], xy_px: Points, points_px: Points
 ) -> Points:
-    """Points (E, m, 3) of gridlines (E, 2) in the plane of the black; xy (M, 2) are the markers as they appear.
+    """Points (E, m, 3) of gridlines (E, 2) in the plane of the black; xy (M, 2) are the markers there.
 
     The variance of a point is across its gridline.
     """

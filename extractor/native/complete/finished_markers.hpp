@@ -26,7 +26,8 @@ struct FinishedMarkers {
              are_all_measured)
 };
 
-// view, the full image; cells, at which its quality is measured.
+// view, the full image; cells, at which its quality is measured. The markers are in the plane of the black,
+// as far as the image's parallax is known.
 FinishedMarkers finish_markers(const image::PyramidLevel& view, const RefinedMarkers& refined,
                                const refine::StartPlaces& places, const layout::RingTables& tables,
                                const layout::Topology& topology, const SampledCells& cells,
