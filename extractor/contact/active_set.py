@@ -10,11 +10,12 @@ not add stray loads.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import contact as native
 from extractor.contact.gel import Gel
 
 Array = NDArray[np.float64]
@@ -63,6 +64,22 @@ class Solution:
     inverse: Array
     chi: float
     largest_gain: float
+
+
+class Settled(NamedTuple):
+    """Of the S given loads those that press, K.
+
+    Attributes:
+        kept: (K,) their places among the given ones.
+        traction: (K, 3) in Young's moduli.
+        inverse: (3 K, 3 K) their covariance by the noise.
+        residual: (R,) whitened.
+    """
+
+    kept: Ids
+    traction: Array
+    inverse: Array
+    residual: Array
 
 
 class TractionSolver:
@@ -168,29 +185,10 @@ class TractionSolver:
 
     def _settle(self, white: Array, whitening: Array, support: Ids) -> tuple[Ids, Array, Array, Array]:
         """The support without loads that would pull, their tractions, covariance, and the whitened residual."""
-        blocks = np.einsum(
-            "mij,smaj->mias",
-            whitening,
-            self._by_load[support].reshape(len(support), 3, -1, self._axes).transpose(0, 2, 1, 3),
-            optimize=True,
+        found = native.settle(
+            self._by_load[support], whitening, white.reshape(-1), self._limits.tau**-2
         )
-        columns = blocks.reshape(white.size, 3, len(support)).transpose(0, 2, 1).reshape(white.size, -1)
-        gram = columns.T @ columns
-        gram[np.diag_indices_from(gram)] += self._limits.tau**-2
-        right = columns.T @ white.reshape(-1)
-        kept = np.arange(len(support))
-        while len(kept):
-            rows = (3 * kept[:, None] + np.arange(3)).ravel()
-            part = gram[np.ix_(rows, rows)]
-            traction = np.linalg.solve(part, right[rows]).reshape(-1, 3)
-            pulls = traction[:, 2] >= 0
-            if not pulls.any():
-                break
-            kept = kept[~pulls]
-        if not len(kept):
-            return support[:0], np.empty((0, 3)), np.empty((0, 0)), white
-        residual = white.reshape(-1) - times(columns[:, rows], traction.reshape(-1))
-        return support[kept], traction, np.linalg.inv(part), residual.reshape(white.shape)
+        return support[found.kept], found.traction, found.inverse, found.residual.reshape(white.shape)
 
 
 def times(matrix: NDArray[Any], vector: NDArray[Any]) -> NDArray[Any]:
