@@ -27,8 +27,7 @@ from benchmarks.ablation.report import comparison_row, merged, page
 from benchmarks.frame.experiment import COMMIT, Experiment, Found, OptionError, Shown
 from benchmarks.suites.ablation.comparison import Change, Comparison, compare
 from benchmarks.suites.ablation.pictures import POOLED, PROVOKING, KeptPicture, keep_pictures
-from benchmarks.suites.ablation.rule import Kind, Rule
-from benchmarks.suites.ablation.rules import BY_NAME, RULES
+from benchmarks.suites.ablation.rules import BY_NAME, RULES, Kind, Rule
 from benchmarks.suites.ablation.trial import PictureScore, read_without
 from benchmarks.suites.code_copy import CodeCopy
 from extractor.presets import Preset

@@ -16,8 +16,7 @@ from benchmarks.ablation.report import merged_rows
 from benchmarks.suites.ablation.comparison import MIN_LOSS, compare
 from benchmarks.suites.ablation.pictures import PatternTruth, keep_pictures, pattern_truth, sampled_cases
 from benchmarks.suites.ablation.provoking import CHANGES, FOREIGN, provoking_cases
-from benchmarks.suites.ablation.rule import Rule
-from benchmarks.suites.ablation.rules import RULES
+from benchmarks.suites.ablation.rules import RULES, Rule
 from benchmarks.suites.ablation.trial import PictureScore, read_without, score_reading
 from benchmarks.suites.ablation.worker import ReadPicture
 from benchmarks.suites.code_copy import ROOT, CodeCopy, Replacement, replaced_text

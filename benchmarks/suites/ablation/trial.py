@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
-from benchmarks.suites.ablation.rule import Rule
+from benchmarks.suites.ablation.rules import Rule
 from benchmarks.suites.ablation.worker import ReadPicture
 from benchmarks.suites.code_copy import CodeCopy, Replacement, environment
 from benchmarks.suites.scoring.calibration import BEYOND_D2, squared_distances
