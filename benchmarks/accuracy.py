@@ -34,6 +34,7 @@ from benchmarks.suites.scoring.squares import (
     calibrations_by_position,
     picture_squares,
 )
+from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
 from extractor.presets import PRESETS, Preset
@@ -99,11 +100,12 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[MeasuredCa
     rendered = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
     visible = rendered[0].truth.visible
     true = rendered[0].truth.marker_xy_px
+    tolerance_px = WRONG_SHARE * shortest_edges(scene.layout, true)
     for preset in PRESETS:
         extractor = cached_extractor(case, preset)
         read = [extractor.extract(picture.image) for picture in rendered]
         errors = np.array([markers.xy_px for markers in read]) - true
-        wrong = np.linalg.norm(errors, axis=2) > WRONG_SHARE * shortest_edges(scene.layout, true)
+        wrong = [wrong_markers(markers, true, tolerance_px).any_kind & visible for markers in read]
         found = np.isfinite(errors[..., 0]) & visible
         good = found & inner
         inner_d2 = [
@@ -111,7 +113,7 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[MeasuredCa
             for error, markers, chosen in zip(errors, read, good, strict=True)
         ]
         result = AccuracyResult(
-            group, case_name(group, case), preset, float(found[:, visible].mean()), int((wrong & found).sum()),
+            group, case_name(group, case), preset, float(found[:, visible].mean()), int(np.sum(wrong)),
             rms(errors[good]), bounds[0], rms(errors[found]), bounds[1],
             float(abs(errors[good].mean(axis=0)).max()) if good.any() else float("nan"),
             summarise(inner_d2).z.value,

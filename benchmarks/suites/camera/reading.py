@@ -14,11 +14,13 @@ from benchmarks.suites.camera.shoot import CameraPicture, shoot
 from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges, standard_layout
 from benchmarks.suites.scoring.calibration import squared_distances
 from benchmarks.suites.scoring.contrast import neighbour_contrast
+from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.files.layout_json import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.presets import Preset
 
 RUNS = 2  # readings of a picture
+NO_REASON = "no reason given"
 # a marker's outcome as one letter
 UNSEEN, MEASURED, ESTIMATED, LOST, WRONG_PLACE, WRONG_ID = ".merpi"
 
@@ -64,6 +66,11 @@ class PictureResult:
     @property
     def wrong_places(self) -> int:
         return self.outcomes.count(WRONG_PLACE)
+
+    @property
+    def is_unread(self) -> bool:
+        """No marker is reported."""
+        return not self.outcomes.strip(UNSEEN + LOST)
 
     @property
     def measured_share(self) -> float:
@@ -130,23 +137,19 @@ def score_picture(
         measured=int((measured & picture.visible).sum()),
         visible=int(picture.visible.sum()),
         ms=ms,
-        reason=str(markers.reason) if markers.reason else "",
+        reason=str(markers.reason or ("" if markers.found else NO_REASON)),
         contrast=picture_contrast(picture),
     )
 
 
 def marker_outcomes(picture: CameraPicture, markers: Markers) -> NDArray[np.str_]:
     """(M,) letters, see ``PictureResult``."""
-    true_px = picture.marker_xy_px
-    reported = markers.status != Status.LOST
-    error_px = np.linalg.norm(markers.xy_px - true_px, axis=1)
-    wrong = reported & ~(error_px <= WRONG_SHARE * shortest_edges(picture.layout, true_px))
+    true_px, is_measured = picture.marker_xy_px, markers.status == Status.MEASURED
+    wrong = wrong_markers(markers, true_px, WRONG_SHARE * shortest_edges(picture.layout, true_px))
     outcome = np.full(len(true_px), UNSEEN)
     outcome[picture.visible] = ESTIMATED
-    outcome[picture.visible & ~reported] = LOST
-    outcome[picture.visible & (markers.status == Status.MEASURED)] = MEASURED
-    outcome[wrong] = WRONG_PLACE
-    numbers = np.flatnonzero(wrong & np.isfinite(markers.xy_px).all(axis=1))
-    distance_px = np.linalg.norm(markers.xy_px[numbers][:, None] - true_px, axis=2)
-    outcome[numbers[distance_px.argmin(axis=1) != numbers]] = WRONG_ID
+    outcome[picture.visible & (markers.status == Status.LOST)] = LOST
+    outcome[picture.visible & is_measured] = MEASURED
+    outcome[wrong.places] = WRONG_PLACE
+    outcome[wrong.ids] = WRONG_ID
     return outcome
