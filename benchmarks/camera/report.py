@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 
 from benchmarks.frame.pooled import Columns, grouped, percentile, pooled_table, reasons, share, total
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.camera.cases import KINDS
 from benchmarks.suites.camera.effects import COLOR_EFFECTS
-from benchmarks.suites.camera.reading import PictureResult
+from benchmarks.suites.camera.reading import PictureResult, rms_px
 from benchmarks.suites.scoring.calibration import stated_columns
 
 TOGETHER = "together"
@@ -17,12 +16,6 @@ MIN_CONTRAST, MIN_PITCH_PX = 20.0, 8.0  # from which on neighbouring cells are s
 COLORS_SEPARABLE, ALL_SEPARABLE = "colors, CIE76 20", "together, CIE76 20"
 MAX_FAILURES = 40  # listed pictures
 Results = Sequence[PictureResult]
-
-
-def _rms_px(results: Results) -> float | None:
-    """Per axis, of visible measured markers that are not wrong."""
-    squared_px2 = share("squared_px2", "right")(results)
-    return None if squared_px2 is None else math.sqrt(squared_px2 / 2)
 
 
 COLUMNS: Columns = {
@@ -33,7 +26,7 @@ COLUMNS: Columns = {
     "measured": (".1%", share("measured", "visible")),
     "ids": ("d", total("wrong_ids")),
     "places": ("d", total("wrong_places")),
-    "rms px": (".4f", _rms_px),
+    "rms px": (".4f", rms_px),
     **stated_columns(lambda result: result.d2),
     "p50 ms": (".1f", percentile("ms", 50)),
     "p99 ms": (".1f", percentile("ms", 99)),
