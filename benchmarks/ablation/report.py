@@ -96,10 +96,10 @@ def page(measured: Mapping[str, Any]) -> Page:
 
 
 def _share(change: Mapping[str, float | None]) -> str:
-    """The difference and its interval, in percent of the figure with the rule; "-" where nothing is left to measure."""
+    """The difference and its interval, in percent of the figure with the rule; "-" where either is nothing."""
     values = [change[name] for name in ("full", "without", "low", "high")]
     full, without, low, high = (math.nan if value is None else value for value in values)
-    if math.isnan(full + without + low + high):
+    if not full or math.isnan(full + without + low + high):
         return "-"
     unit = 100 / full
     return f"{unit * (without - full):+.1f} [{unit * low:+.1f}, {unit * high:+.1f}]"
