@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.pooled import grouped, rms_of
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.scenes import (
@@ -37,7 +37,7 @@ from benchmarks.suites.scoring.squares import (
 from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
-from extractor.presets import PRESETS, Preset
+from extractor.presets import PRESETS
 
 SEEDS, QUICK_SEEDS = 5, 2
 # layers that fit the image at the larger edges
@@ -114,18 +114,13 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[MeasuredCa
         ]
         result = AccuracyResult(
             group, case_name(group, case), preset, float(found[:, visible].mean()), int(np.sum(wrong)),
-            rms(errors[good]), bounds[0], rms(errors[found]), bounds[1],
+            rms_of(errors[good]), bounds[0], rms_of(errors[found]), bounds[1],
             float(abs(errors[good].mean(axis=0)).max()) if good.any() else float("nan"),
             summarise(inner_d2).z.value,
             float(np.min([markers.timings_ms.get("refine", np.nan) for markers in read])),
         )  # fmt: skip
         truths = [picture.truth for picture in rendered]
         yield MeasuredCase(result, tuple(map(picture_squares, read, truths)))
-
-
-def rms(errors: NDArray[np.float64]) -> float:
-    """Root mean square; NaN without values."""
-    return float(np.sqrt(np.mean(errors**2))) if len(errors) else float("nan")
 
 
 def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
@@ -139,28 +134,16 @@ def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
     return Table(title, COLUMNS, rows)
 
 
-def squares_by_preset(measured: Sequence[MeasuredCase]) -> dict[str, list[PictureSquares]]:
-    """The squares of all cases' pictures by preset."""
-    return {
-        preset: [squares for case in measured if case.result.preset == preset for squares in case.squares]
-        for preset in PRESETS
-    }
-
-
 def markdown(results: Sequence[AccuracyResult]) -> str:
     """One row per case, columns per preset: error over the bound, and z."""
-    head = " | ".join(f"{preset}: of the bound | z" for preset in PRESETS)
-    lines = [f"| | bound px | {head} | bias px |", "|---" * (3 + 2 * len(PRESETS)) + "|"]
-    for name in dict.fromkeys(r.case for r in results):
-        by_preset: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
-        cells = [name, f"{by_preset['balanced'].inner_bound_px:.4f}"]
-        for preset in PRESETS:
-            cells += [
-                f"{by_preset[preset].inner_px / by_preset[preset].inner_bound_px:.2f}",
-                f"{by_preset[preset].z:.2f}",
-            ]
-        lines.append(f"| {' | '.join(cells)} | {by_preset['accurate'].bias_px:.4f} |")
-    return "\n".join(lines)
+    columns = {"": TEXT, "bound px": ".4f"}
+    for preset in PRESETS:
+        columns |= {f"{preset}: of the bound": ".2f", f"{preset}: z": ".2f"}
+    rows = []
+    for name, some in grouped(results, "case").items():
+        of_presets = [value for r in some for value in (r.inner_px / r.inner_bound_px, r.z)]
+        rows.append((name, some[0].inner_bound_px, *of_presets, some[-1].bias_px))
+    return Table("", columns | {"bias px": ".4f"}, rows).markdown()
 
 
 def page(measured: Mapping[str, Any]) -> Page:
@@ -184,8 +167,8 @@ def measure(quick: bool = False) -> Shown:
         results += own
         yield results_table(f"{group}; sRGB pictures, {seeds} noises", own)
         stated = {
-            preset: calibrations_by_position(pictures)
-            for preset, pictures in squares_by_preset(of_group).items()
+            preset: calibrations_by_position([squares for case in cases for squares in case.squares])
+            for preset, cases in grouped(of_group, "result.preset").items()
         }
         named = {
             f"{preset}: {name}": one for preset, by_name in stated.items() for name, one in by_name.items()

@@ -68,7 +68,7 @@ def joined(results: Sequence[Any], name: str) -> NDArray[Any]:
     return np.concatenate([attrgetter(name)(result) for result in results])
 
 
-def root_mean_square(values: Any) -> float:
+def rms_of(values: Any) -> float:
     """The root of the mean square of the known values of an array; NaN without any."""
     squares = np.square(np.asarray(values, dtype=np.float64))
     known = squares[~np.isnan(squares)]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from benchmarks.frame.pooled import root_mean_square
+from benchmarks.frame.pooled import rms_of
 from benchmarks.suites.comparison.methods import METHODS, REFERENCE_METHOD, Method
 from benchmarks.suites.scenes import (
     SCENE_KINDS,
@@ -224,7 +224,7 @@ def _method_result(read: SceneSamples, method: Method) -> MethodResult:
     return MethodResult(
         method=method.name, scene=read.case.name,
         found_share=float(np.isfinite(errors[:, every, 0]).mean()), wrong=sum(one.wrong for one in samples),
-        all_px=root_mean_square(errors[:, every]), inner_px=root_mean_square(errors[:, inner]),
+        all_px=rms_of(errors[:, every]), inner_px=rms_of(errors[:, inner]),
         bias_px=float(abs(found.mean(axis=0)).max()) if len(found) else float("nan"),
         all_bound_px=rms_per_axis(bound_px2[every]), bound_px=rms_per_axis(bound_px2[inner]),
         ms=float(np.median(ms)), ratio=float(np.median(ratios)),
@@ -275,4 +275,4 @@ def _pooled_result(method: Method, read: Sequence[SceneSamples]) -> PooledResult
 
 def rms_per_axis(squares: NDArray[np.generic]) -> float:
     """The root of half the mean of sums of two squares, without unknown ones; NaN without any."""
-    return root_mean_square(np.sqrt(squares / 2))
+    return rms_of(np.sqrt(squares / 2))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.frame.pooled import Columns, Figure, joined, pooled_table, root_mean_square
+from benchmarks.frame.pooled import Columns, Figure, joined, pooled_table, rms_of
 from benchmarks.frame.table import Table
 from benchmarks.suites.coupons.cases import CouponCase, random_case
 from benchmarks.suites.coupons.photograph import photograph_coupon
@@ -64,10 +64,10 @@ def _of_kerfs(figure: Callable[[Floats, Floats], Any]) -> Figure:
 COLUMNS: Columns = {
     "pictures": ("d", len),
     "mean um": ("+.2f", _of_kerfs(lambda error, _: error.mean())),
-    "RMS um": (".2f", _of_kerfs(lambda error, _: root_mean_square(error))),
+    "RMS um": (".2f", _of_kerfs(lambda error, _: rms_of(error))),
     "worst picture": (".2f", lambda errors: max(1000 * abs(one.error_mm.mean()) for one in errors)),
-    "stated um": (".2f", _of_kerfs(lambda _, sigma: root_mean_square(sigma))),
-    "z": (".2f", _of_kerfs(lambda error, sigma: root_mean_square(error / sigma))),
+    "stated um": (".2f", _of_kerfs(lambda _, sigma: rms_of(sigma))),
+    "z": (".2f", _of_kerfs(lambda error, sigma: rms_of(error / sigma))),
     "> 3": (".1%", _of_kerfs(lambda error, sigma: (np.abs(error / sigma) > 3).mean())),
 }
 GROUPS: dict[str, Callable[[CouponCase], bool]] = {

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.pooled import rms_of
 from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges
 from benchmarks.suites.scoring.wrong import WrongMarkers, wrong_markers
 from benchmarks.suites.stress.frames import CaseImage
@@ -112,8 +113,7 @@ def _score_pattern(
 
 
 def _rms(markers: Markers, truth: Truth, chosen: Bools) -> float:
-    error = markers.xy_px[chosen] - truth.marker_xy_px[chosen]
-    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
+    return rms_of(markers.xy_px[chosen] - truth.marker_xy_px[chosen])
 
 
 def _is_promised(scene: Scene, truth: Truth, promised_mask: Bools, shape: tuple[int, ...]) -> bool:
