@@ -98,7 +98,8 @@ def codec_row(
     error_px, moved_px = xy_px - true_px, xy_px - png_px
     return (
         name, rms_of(moved_px), float(np.nanmax(np.abs(moved_px))), rms_of(error_px),
-        rms_of(error_px) / rms_of(png_px - true_px), rms_of(error_px / sigma_px), float(np.mean([one.status == 0 for one in read])), coded.kb, coded.ms,
+        rms_of(error_px) / rms_of(png_px - true_px), rms_of(error_px / sigma_px),
+        float(np.mean([one.status == 0 for one in read])), coded.kb, coded.ms,
     )  # fmt: skip
 
 
