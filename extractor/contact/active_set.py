@@ -185,10 +185,22 @@ class TractionSolver:
 
     def _settle(self, white: Array, whitening: Array, support: Ids) -> tuple[Ids, Array, Array, Array]:
         """The support without loads that would pull, their tractions, covariance, and the whitened residual."""
-        found = native.settle(
-            self._by_load[support], whitening, white.reshape(-1), self._limits.tau**-2
-        )
+        found = settled(self._by_load[support], whitening, white.reshape(-1), self._limits.tau**-2)
         return support[found.kept], found.traction, found.inverse, found.residual.reshape(white.shape)
+
+
+def settled(by_load: NDArray[np.float32], whitening: Array, white: Array, information: float) -> Settled:
+    """The tractions that minimise |white - W A t|^2 + information |t|^2, of the loads that press.
+
+    Loads that pull leave together, until all press. Everything runs in the thread of the caller, see ``times``.
+
+    Args:
+        by_load: (S, 3, R) the measured numbers by the traction of a load.
+        whitening: (M, C, C), with M C = R.
+        white: (R,) whitened numbers.
+        information: of a traction before the measurement.
+    """
+    return native.settle(by_load, whitening, white, information)
 
 
 def times(matrix: NDArray[Any], vector: NDArray[Any]) -> NDArray[Any]:
