@@ -238,6 +238,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("tracking", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -88,6 +88,4 @@ def measure(quick: bool = False, scatter_px: float = 0.2, pads: int = 2, seed: i
 
 
 main = Experiment("as_made", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

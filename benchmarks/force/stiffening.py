@@ -129,6 +129,4 @@ def measure(one_view: float | None = None, seed: int = 1) -> Shown:
 
 
 main = Experiment("force.stiffening", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)
