@@ -152,6 +152,4 @@ def measure(seconds: float = SECONDS, quick: bool = False) -> Shown:
 
 
 main = Experiment("latency", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)
