@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from cmpdesign.documents.calibration import CalibrateCheckDocument, ForceScalePart
 
 EXAMPLES = (
-    "cmpdesign calibrate check index.toml",
+    "cmpdesign calibrate check index.toml pad.png",
     "cmpdesign calibrate check index.toml pad.png --json",
 )
 EXIT_CHANGED = 1
