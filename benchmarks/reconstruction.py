@@ -14,29 +14,29 @@ frames in turns: "cpu ms" of the processor, in all threads, and "clock ms". A pa
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import least_in_turns, timed
+from benchmarks.suites.halves import placed_views, rig_of, two_cameras
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
-from cmpdesign.scene import Optics, Pinhole, Plain, Scene, Sensor, cramer_rao, render
-from cmpdesign.scene.standard import BLACK_RGB, INKS
+from cmpdesign.scene import Scene, cramer_rao, render, standard_scene
 from extractor import (
     Field,
     Reconstructor,
-    Rig,
     Shape,
     ShapeTracker,
-    View,
     ViewExtractor,
     parse_layout,
     triangulate,
@@ -47,7 +47,6 @@ Surface = Callable[[Array], Array]
 
 FRAMES, QUICK_FRAMES = 8, 2
 ROUNDS, QUICK_ROUNDS = 12, 2  # of the frames of a press, for times
-DISTORTION = (-0.08, 0.03, 0.0005, -0.0008, 0.0)
 
 
 class SensorSetup(NamedTuple):
@@ -86,31 +85,6 @@ FIRST_MM, STEP_MM, STEPS = 0.1, 0.04, 10  # of the press whose times are measure
 GRID = 64  # points of a field along each axis
 
 
-def make_cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tuple[Pinhole, ...]:
-    """Cameras of the left and the right half of the image, behind the pattern."""
-    width, height = size[0] // 2, size[1]
-    return tuple(
-        Pinhole.looking(
-            size,
-            distance_mm=distance_mm,
-            field_of_view_deg=44.0,
-            tilt_deg=angle_deg,
-            azimuth_deg=azimuth,
-            roll_deg=roll,
-            back=True,
-            distortion=DISTORTION,
-            area_px=(k * width, 0, width, height),
-            name=name,
-        )
-        for k, (name, azimuth, roll) in enumerate((("left", 180.0, 1.5), ("right", 0.0, -1.0)))
-    )
-
-
-def make_rig(views: tuple[Pinhole, ...]) -> Rig:
-    """A rig with intrinsics and without poses."""
-    return Rig(tuple(View(v.name, v.focal_px, v.centre_px, v.distortion, v.area_px) for v in views))
-
-
 @dataclass(frozen=True, eq=False)
 class RestedSensor:
     """A sensor after its rest frame: the scene without surface, and what reads its images."""
@@ -123,31 +97,24 @@ class RestedSensor:
     @classmethod
     def of(cls, setup: SensorSetup) -> RestedSensor:
         layout = build_layout(load_design("tac3d"))
-        views = make_cameras(*setup)
-        scene = Scene(
-            layout=layout, camera=views, background=Plain(BLACK_RGB), optics=Optics(1.0), sensor=Sensor(noise=2.0),
-            inks=INKS, seed=1000,
-        )  # fmt: skip
+        views = two_cameras(
+            setup.size,
+            (1.5, -1.0),
+            distance_mm=setup.distance_mm,
+            field_of_view_deg=44.0,
+            tilt_deg=setup.angle_deg,
+        )
+        scene = replace(standard_scene(layout, seed=1000), camera=views)
         reference = parse_layout(layout_to_json(layout))
-        extractor = ViewExtractor(reference, make_rig(views))
+        extractor = ViewExtractor(reference, rig_of(views))
         rest = extractor.extract(render(scene, size=setup.size).image)
         return cls(scene, setup.size, extractor, Reconstructor(reference, extractor.rig, rest))
 
-    @property
-    def placed(self) -> list[View]:
-        """The views with their true poses."""
-        return [
-            View(
-                v.name, v.focal_px, v.centre_px, v.distortion, v.area_px, None, v.R_camera_from_layout,
-                v.t_camera_from_layout_mm,
-            )
-            for v in self.scene.camera
-        ]  # fmt: skip
-
     def implied_deviation_um(self, xyz: Array, cov_px2: Array, shown: NDArray[np.bool_]) -> tuple[float, ...]:
         """RMS deviation per axis that pixel covariances imply with exact poses of the views."""
-        pixels = np.stack([view.project(xyz) for view in self.placed])
-        cov = triangulate(self.placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
+        placed = placed_views(self.scene.camera)
+        pixels = np.stack([view.project(xyz) for view in placed])
+        cov = triangulate(placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
         return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(cov, axis=0)))
 
     def state_row(self, state: str, surface: Surface | None, frames: int) -> tuple[object, ...]:
@@ -158,11 +125,11 @@ class RestedSensor:
         flat = np.column_stack([xy_mm, np.zeros(len(xy_mm))])
         for seed in range(frames):
             shot = render(replace(shown, seed=seed), size=self.size)
-            begin = time.perf_counter()
-            markers = self.extractor.extract(shot.image)
-            middle = time.perf_counter()
-            shape = self.reconstructor.reconstruct(markers)
-            times.append((middle - begin, time.perf_counter() - middle))
+            extracted = timed(partial(self.extractor.extract, shot.image))
+            markers = extracted.result
+            reconstructed = timed(partial(self.reconstructor.reconstruct, markers))
+            shape = reconstructed.result
+            times.append((extracted.clock_ms, reconstructed.clock_ms))
             true = shot.truth.marker_xyz_mm
             errors.append(shape.xyz_mm - true)
             cov.append(shape.cov_mm2)
@@ -183,8 +150,8 @@ class RestedSensor:
         return (
             state, float(known.mean()), found_um, stated_um, image_um, bound_ratio(found_um, stated_um),
             bound_ratio(found_um, image_um), float(np.sqrt(squares.mean())), rms_um(np.concatenate(moved)),
-            rms_um(np.concatenate(virtual)), float(np.sqrt(np.nanmean(np.square(tilts)))),
-            tuple(1e3 * np.median(times, axis=0)),
+            rms_um(np.concatenate(virtual)), rms_of(tilts),
+            tuple(np.median(times, axis=0)),
         )  # fmt: skip
 
 
@@ -203,7 +170,7 @@ def time_rows(sensor: RestedSensor, rounds: int) -> list[tuple[str, float, float
         for seed, depth in enumerate(depths_mm.tolist())
     ]  # fmt: skip
     images = (shown + shown[-2:0:-1]) * rounds
-    reconstructor, least = sensor.reconstructor, dict[str, tuple[float, float]]()
+    reconstructor = sensor.reconstructor
     markers = [sensor.extractor.extract(image) for image in shown]
     shape, views = reconstructor.reconstruct(markers[0]), reconstructor.poses.views
     side = 0.9 * np.abs(reconstructor.layout.xy_mm).max() * np.linspace(-1.0, 1.0, GRID)
@@ -225,15 +192,7 @@ def time_rows(sensor: RestedSensor, rounds: int) -> list[tuple[str, float, float
         "reconstruct, with virtual markers and all covariances": lambda k: all_of(reconstruct(k)),
         f"field of {GRID} x {GRID} points": lambda k: field.at(shape.displacement_mm, grid_mm),
     }
-    for number in range(len(images)):
-        for name, call in work.items():
-            started = time.process_time(), time.perf_counter()
-            call(number)
-            spent = 1e3 * (time.process_time() - started[0]), 1e3 * (time.perf_counter() - started[1])
-            least[name] = (
-                spent if name not in least else (min(spent[0], least[name][0]), min(spent[1], least[name][1]))
-            )
-    return [(name, *times) for name, times in least.items()]
+    return [(name, *least) for name, least in least_in_turns(work, len(images)).items()]
 
 
 def angles_deg(normals: Array, xy_mm: Array, surface: Surface | None) -> Array:
@@ -276,6 +235,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("reconstruction", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -12,13 +12,15 @@ with which the reference fits the image best. Times are those of sRGB images. On
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
+from benchmarks.suites.halves import two_cameras
 from benchmarks.suites.scanlines import ImageWindow, measure_render_error
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.scene import Dent, Pinhole, Scene, composed, render, standard_layout, standard_scene
@@ -27,6 +29,7 @@ SIZE = (640, 480)
 REPEATS, QUICK_REPEATS = 40, 5
 LIMIT_MS = {"flat": 50.0, "pressed": 120.0, "steep, parts hidden": 120.0}  # of CPU time, the median
 TURN_DEG = 30.0
+UNDISTORTED = (0.0,) * 5
 BARREL = (-0.2, 0.05, 0.001, -0.002, 0.0)
 
 
@@ -41,26 +44,21 @@ def make_scenes(grid: int = 256) -> dict[str, Scene]:
     lens = Pinhole.looking(
         SIZE, distance_mm=32, field_of_view_deg=48, tilt_deg=12, roll_deg=TURN_DEG, distortion=BARREL
     )
-    halves = [
-        Pinhole.looking(
-            SIZE,
-            distance_mm=46,
-            field_of_view_deg=30,
-            tilt_deg=14,
-            azimuth_deg=azimuth,
-            roll_deg=TURN_DEG,
-            back=True,
-            mirror=True,
-            area_px=(x, 0, 320, 480),
-        )
-        for azimuth, x in ((180, 0), (0, 320))
-    ]
+    halves = two_cameras(
+        SIZE,
+        (TURN_DEG, TURN_DEG),
+        distance_mm=46,
+        field_of_view_deg=30,
+        tilt_deg=14,
+        mirror=True,
+        distortion=UNDISTORTED,
+    )
     surface = contact.surface()
     return {
         "flat": flat,
         "distorted": replace(flat, camera=lens),
         "pressed": replace(flat, camera=back, surface=surface),
-        "pressed, two views": replace(flat, camera=tuple(halves), surface=surface),
+        "pressed, two views": replace(flat, camera=halves, surface=surface),
     }
 
 
@@ -75,13 +73,9 @@ def steep_scene(flat: Scene) -> Scene:
 def speed_row(name: str, scene: Scene, repeats: int) -> tuple[str, float, float, float]:
     """Times in ms with the blur and noise of the standard scene, after one picture that is not timed."""
     render(scene, size=SIZE)
-    wall, cpu = [], []
-    for _ in range(repeats):
-        before = time.perf_counter(), time.process_time()
-        render(scene, size=SIZE)
-        wall.append(1e3 * (time.perf_counter() - before[0]))
-        cpu.append(1e3 * (time.process_time() - before[1]))
-    return name, float(np.median(wall)), float(np.percentile(wall, 95)), float(np.median(cpu))
+    runs = [timed(partial(render, scene, size=SIZE)) for _ in range(repeats)]
+    p50, p95 = np.percentile([one.clock_ms for one in runs], (50, 95))
+    return name, float(p50), float(p95), float(np.median([one.cpu_ms for one in runs]))
 
 
 def measure(quick: bool = False) -> Shown:
@@ -113,6 +107,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("rendering", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -24,7 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from benchmarks.tracking import render_sequence
 from cmpdesign.files.images import to_png
 from cmpdesign.files.layout_json import layout_to_json
@@ -81,15 +83,8 @@ def encode_and_decode(images: Sequence[NDArray[np.uint8]], name: str, folder: Pa
 
 def png_files(images: Sequence[NDArray[np.uint8]]) -> Coded:
     """The frames themselves, with the size of their PNG files."""
-    started = time.perf_counter()
-    sizes = [len(to_png(image)) for image in images]
-    ms = 1e3 * (time.perf_counter() - started) / len(images)
-    return Coded(list(images), sum(sizes) / 1e3 / len(images), ms)
-
-
-def rms(values: NDArray[np.float64]) -> float:
-    """Root mean square of the known values."""
-    return float(np.sqrt(np.nanmean(values**2)))
+    sizes = timed(lambda: [len(to_png(image)) for image in images])
+    return Coded(list(images), sum(sizes.result) / 1e3 / len(images), sizes.clock_ms / len(images))
 
 
 def codec_row(
@@ -101,8 +96,9 @@ def codec_row(
     sigma_px = np.sqrt(np.stack([one.cov_px2[:, [0, 1], [0, 1]] for one in read]))
     error_px, moved_px = xy_px - true_px, xy_px - png_px
     return (
-        name, rms(moved_px), float(np.nanmax(np.abs(moved_px))), rms(error_px), rms(error_px) / rms(png_px - true_px),
-        rms(error_px / sigma_px), float(np.mean([one.status == 0 for one in read])), coded.kb, coded.ms,
+        name, rms_of(moved_px), float(np.nanmax(np.abs(moved_px))), rms_of(error_px),
+        rms_of(error_px) / rms_of(png_px - true_px), rms_of(error_px / sigma_px),
+        float(np.mean([one.status == 0 for one in read])), coded.kb, coded.ms,
     )  # fmt: skip
 
 
@@ -127,6 +123,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("codecs", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -20,8 +20,13 @@ from dataclasses import asdict, replace
 from typing import Literal
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
-from benchmarks.suites.comparison.measure import CASES, MethodResult, measure_case
-from benchmarks.suites.comparison.pooled import measure_pooled, pooled_cases
+from benchmarks.suites.comparison.measure import (
+    CASES,
+    MethodResult,
+    measure_case,
+    measure_pooled,
+    pooled_cases,
+)
 from benchmarks.suites.comparison.report import page, pooled_table, scene_table
 
 REPETITIONS, QUICK_REPETITIONS = 11, 3
@@ -49,6 +54,4 @@ def measure(quick: bool = False, response: Literal["srgb", "linear"] = "srgb") -
 
 
 main = Experiment("comparison", measure, page)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -6,9 +6,8 @@ one tests them.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,9 @@ from numpy.typing import NDArray
 from benchmarks.force.seen import seen_from
 from benchmarks.force.truth import DEPTHS_MM, FRICTION, TRUTH, YOUNG_MPA, Case, cases
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.finite_block import make_gel
@@ -65,7 +66,9 @@ class Errors(NamedTuple):
     times_ms: tuple[float, float]
 
 
-def errors_of(found: ContactForce, frame: dict[str, Array], name: str, times_ms: list[float]) -> Errors:
+def errors_of(
+    found: ContactForce, frame: dict[str, Array], name: str, times_ms: tuple[float, float]
+) -> Errors:
     """The errors of one frame of the truth."""
     press, error = -float(frame["force_n"][2]), found.force_n - frame["force_n"]
     sigma, torque_sigma = (np.sqrt(np.diag(cov)) for cov in (found.force_cov_n2, found.torque_cov_nmm2))
@@ -97,7 +100,7 @@ def errors_of(found: ContactForce, frame: dict[str, Array], name: str, times_ms:
         utilisation=found.utilisation - float(frame["utilisation"]),
         regions=len(found.regions),
         regions_off=len(found.regions) - (2 if name == "two balls" else 1),
-        times_ms=(times_ms[0], times_ms[1]),
+        times_ms=times_ms,
     )
 
 
@@ -121,13 +124,9 @@ def read_case(
     seen = seen_from(reader_of(case.thickness_mm, case.poisson, depth_mm), far_mm)
     for frame in frames:
         moved = frame["displacement_mm"][DEPTHS_MM.index(depth_mm)].astype(np.float64)
-        times_ms = []
         seen.reader.reset()
-        for _ in range(2):
-            start = time.process_time()
-            found = seen.read(moved, random, lost)
-            times_ms.append(1e3 * (time.process_time() - start))
-        yield errors_of(found, frame, case.name, times_ms)
+        cold, warm = (timed(partial(seen.read, moved, random, lost)) for _ in range(2))
+        yield errors_of(warm.result, frame, case.name, (cold.cpu_ms, warm.cpu_ms))
 
 
 def summary(found: list[Errors]) -> Table:
@@ -146,7 +145,16 @@ def summary(found: list[Errors]) -> Table:
             z = _known(getattr(one, z_name) for one in mine) if z_name else np.empty(0)
             if len(values):
                 worst = float(np.abs(values).max())
-                rows.append((half, quantity, len(values), _rms(values), worst, _rms(z) if len(z) else None))
+                rows.append(
+                    (
+                        half,
+                        quantity,
+                        len(values),
+                        rms_of(values),
+                        worst,
+                        rms_of(z) if len(z) else None,
+                    )
+                )
     columns = {"frames": TEXT, "error of": TEXT, "number": "d", "rms": ".4f", "worst": ".4f", "z": ".2f"}
     return Table(f"frames above {MIN_N} N", columns, rows)
 
@@ -154,10 +162,6 @@ def summary(found: list[Errors]) -> Table:
 def _known(values: Iterable[float | Array]) -> Array:
     flat = np.concatenate([np.empty(0), *(np.atleast_1d(value) for value in values)])
     return flat[np.isfinite(flat)]
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt((values**2).mean()))
 
 
 def measure(
@@ -205,12 +209,10 @@ def measure(
 def row_of(one: Errors) -> tuple[object, ...]:
     """The row of ``COLUMNS``."""
     return (
-        one.name, one.press_n, one.shear_share, one.normal, one.normal_z, one.shear, _rms(one.shear_z), one.torque,
-        _rms(one.torque_z), 1e3 * one.centre_mm, one.radius, one.utilisation, one.regions, *one.times_ms,
+        one.name, one.press_n, one.shear_share, one.normal, one.normal_z, one.shear, rms_of(one.shear_z), one.torque,
+        rms_of(one.torque_z), 1e3 * one.centre_mm, one.radius, one.utilisation, one.regions, *one.times_ms,
     )  # fmt: skip
 
 
 main = Experiment("force", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

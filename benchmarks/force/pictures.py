@@ -6,9 +6,9 @@ surface is reconstructed as a user does.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,12 +19,13 @@ from benchmarks.force.__main__ import COLUMNS, MIN_N, Errors, errors_of, reader_
 from benchmarks.force.truth import DEPTHS_MM, TRUTH, Case, cases
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import Table
-from benchmarks.suites.medium.rigs import DISTORTION, RandomRig
+from benchmarks.frame.timing import timed
+from benchmarks.suites.halves import two_cameras
+from benchmarks.suites.medium.rigs import RandomRig
 from cmpdesign import build_layout
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
-from cmpdesign.scene import Medium, Optics, Pinhole, Plain, Scene, Sensor, render
-from cmpdesign.scene.standard import BLACK_RGB, INKS
+from cmpdesign.scene import Medium, Scene, render, standard_scene
 from extractor import Markers, Reconstructor, ViewExtractor, parse_layout
 
 Array = NDArray[np.float64]
@@ -46,20 +47,10 @@ def sensor_of(thickness_mm: float) -> Seeing:
     """Two cameras below the pad of the truth; noise 2 of 255, blur 1 px."""
     layout = build_layout(load_design("honeycomb", {"mirrored": "true"}))
     medium = Medium(thickness_mm - DEPTH_MM, 1.41, WINDOW_MM, 1.49)
-    width = SIZE[0] // 2
-    cameras = tuple(
-        Pinhole.looking(
-            SIZE, distance_mm=DISTANCE_MM, field_of_view_deg=FIELD_DEG, tilt_deg=TILT_DEG, azimuth_deg=azimuth,
-            back=True, distortion=DISTORTION, area_px=(k * width, 0, width, SIZE[1]), name=name,
-        )
-        for k, (name, azimuth) in enumerate((("left", 180.0), ("right", 0.0)))
-    )  # fmt: skip
-    rig = RandomRig(DISTANCE_MM, TILT_DEG, medium, layout, cameras)
+    cameras = two_cameras(SIZE, distance_mm=DISTANCE_MM, field_of_view_deg=FIELD_DEG, tilt_deg=TILT_DEG)
+    rig = RandomRig(medium, layout, cameras)
     views = ViewExtractor(parse_layout(layout_to_json(layout)), rig.rig(medium))
-    scene = Scene(
-        layout, camera=cameras, background=Plain(BLACK_RGB), optics=Optics(1.0), sensor=Sensor(noise=2.0), inks=INKS,
-        medium=medium,
-    )  # fmt: skip
+    scene = replace(standard_scene(layout), camera=cameras, medium=medium)
     return Seeing(rig, scene, views, views.extract(render(scene, size=SIZE).image))
 
 
@@ -87,12 +78,8 @@ def read_frames(case: Case, frames: list[dict[str, Array]], seed: int) -> Iterat
         surface = moved_surface(reader.layout.xy_mm, displacement)
         image = render(replace(seeing.scene, surface=surface, seed=seed + k), size=SIZE).image
         shape = reconstructor.reconstruct(seeing.views.extract(image))
-        times_ms = []
-        for _ in range(2):
-            start = time.process_time()
-            found = reader.read_shape(shape)
-            times_ms.append(1e3 * (time.process_time() - start))
-        yield errors_of(found, frame, case.name, times_ms)
+        cold, warm = (timed(partial(reader.read_shape, shape)) for _ in range(2))
+        yield errors_of(warm.result, frame, case.name, (cold.cpu_ms, warm.cpu_ms))
 
 
 def measure(only: tuple[str, ...] = (), seed: int = 1) -> Shown:
@@ -114,6 +101,4 @@ def measure(only: tuple[str, ...] = (), seed: int = 1) -> Shown:
 
 
 main = Experiment("force.pictures", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -12,7 +12,6 @@ tests/support/calibration, are fitted beside ``cv2.calibrateCamera``.
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -24,7 +23,8 @@ from numpy.typing import NDArray
 
 import cmpdesign
 from benchmarks.frame.experiment import Experiment, Found, Shown
-from benchmarks.frame.table import Table
+from benchmarks.frame.pooled import pooled_table, rms_of
+from benchmarks.frame.timing import timed
 from benchmarks.suites.lenses.boards import board_error_px, by_opencv
 from benchmarks.suites.lenses.cameras import SIZE_PX, random_camera
 from benchmarks.suites.lenses.pictures import BAD_KINDS, Conditions, take_pictures, to_view
@@ -33,9 +33,7 @@ from benchmarks.suites.lenses.scoring import (
     CameraFigures,
     model_ratio,
     parameters_z,
-    pooled_row,
     rays_z,
-    rms,
     seen_pixels,
 )
 from benchmarks.suites.scenes import standard_layout
@@ -66,9 +64,8 @@ def calibrate_one(condition: str, seed: int, number: int, chessboards: bool) -> 
         taken = replace(taken, bad=tuple(bad.items()))
     layout = standard_layout(layers=10)
     pictures = take_pictures(camera, layout, PICTURES, taken, rng)
-    begin = time.process_time()
-    found = cmpdesign.calibrate_camera(layout, pictures).found
-    cpu_s = time.process_time() - begin
+    calibrated = timed(lambda: cmpdesign.calibrate_camera(layout, pictures).found)
+    found = calibrated.result
     true = to_view(camera.pinhole)
     refused = {number for number, one in enumerate(found.pictures) if not one.used}
     seen = seen_pixels([one.xy_px for one in found.adjusted.problem.sightings])
@@ -81,8 +78,8 @@ def calibrate_one(condition: str, seed: int, number: int, chessboards: bool) -> 
         condition=condition,
         field_deg=camera.field_deg,
         model=found.model.name,
-        image_px=rms(ray_differences(found.camera, true, pixel_grid(SIZE_PX))),
-        seen_px=rms(ray_differences(found.camera, true, seen)),
+        image_px=rms_of(ray_differences(found.camera, true, pixel_grid(SIZE_PX))),
+        seen_px=rms_of(ray_differences(found.camera, true, seen)),
         stated_px=float(np.sqrt(np.nanmean(np.trace(cov, axis1=1, axis2=2)) / 2)),
         z=rays_z(found, true, seen),
         parameters_z=parameters_z(found, true),
@@ -91,7 +88,7 @@ def calibrate_one(condition: str, seed: int, number: int, chessboards: bool) -> 
         bad=len(bad),
         good_refused=len(refused - set(bad)),
         board_px=board_px,
-        cpu_s=cpu_s,
+        cpu_s=calibrated.cpu_ms / 1e3,
     )
 
 
@@ -149,13 +146,13 @@ def corners_text(path: Path) -> str:
     ]
     for name, solve in solvers.items():
         whole = solve(sheet, sightings)
-        inside = rms(np.array([placed_px(whole, one) for one in sightings]))
+        inside = rms_of(np.array([placed_px(whole, one) for one in sightings]))
         left = np.zeros(len(sightings))
         for fold in range(FOLDS):
             part = solve(sheet, [one for i, one in enumerate(sightings) if i % FOLDS != fold])
             left[fold::FOLDS] = [placed_px(part, one) for one in sightings[fold::FOLDS]]
         lines.append(
-            f"  {name:36s} {inside:.3f}   {rms(left):.3f}   {np.nanmedian(left):.3f}   {np.isnan(left).sum()}"
+            f"  {name:36s} {inside:.3f}   {rms_of(left):.3f}   {np.nanmedian(left):.3f}   {np.isnan(left).sum()}"
         )
     found = calibrate_points(sheet, sightings, SIZE_PX)
     refused = [f"{one.name} ({one.cause})" for one in found.pictures if not one.used]
@@ -181,22 +178,14 @@ def measure(
     if corners:
         yield corners_text(Path(corners))
         return Found()
-    rows, kept = [], []
+    groups: dict[str, list[CameraFigures]] = {}
     for name in (condition,) if condition else CONDITIONS:
         found = [calibrate_one(name, seed, number, chessboards) for number in range(cameras)]
-        kept += found
-        narrow = [row for row in found if row.field_deg <= WIDE_DEG]
-        wide = [row for row in found if row.field_deg > WIDE_DEG]
-        rows += [
-            pooled_row(f"{name}, {field}", some)
-            for field, some in (("to 100 degrees", narrow), ("beyond", wide))
-            if some
-        ]
-    yield Table("rays", COLUMNS, rows)
-    return Found({"cameras": [asdict(row) for row in kept]})
+        groups[f"{name}, to 100 degrees"] = [row for row in found if row.field_deg <= WIDE_DEG]
+        groups[f"{name}, beyond"] = [row for row in found if row.field_deg > WIDE_DEG]
+    yield pooled_table("rays", "condition", COLUMNS, groups)
+    return Found({"cameras": [asdict(row) for rows in groups.values() for row in rows]})
 
 
 main = Experiment("lenses", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

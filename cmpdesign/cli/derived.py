@@ -154,7 +154,7 @@ def _taken(call: Callable[..., Any]) -> Iterator[_Taken]:
                 (one.usual for one in options_of(SequenceOptions) if one.name == each.name), Written()
             )
         default = each.default if written.needed is None else _REQUIRED if written.needed else None
-        is_placed = each.kind is each.POSITIONAL_OR_KEYWORD and each.default is _REQUIRED
+        is_placed = each.kind is each.POSITIONAL_OR_KEYWORD and each.default in (_REQUIRED, ())
         is_argument = is_placed and each.name != "output" and written.name is None
         yield _Taken(each.name, kind, default, written, is_argument)
 

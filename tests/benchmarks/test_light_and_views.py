@@ -34,7 +34,7 @@ from benchmarks.suites.views.views import (
     seen_cells,
     up_cells,
 )
-from benchmarks.sweeps.__main__ import kind_row
+from benchmarks.sweeps.__main__ import lines_table
 
 
 def test_daylight_shows_the_inks_as_they_are() -> None:
@@ -68,7 +68,7 @@ def test_steps_between_read_ones_are_counted() -> None:
 
     assert [between(steps) for steps in ("...", "xx..x", ".x.xx.", "xxx", "x.x")] == [0, 0, 3, 0, 0]
     broken = LineResult(Line(LAMPS, 0, 0), ("", "no_color", ""), 2)
-    assert kind_row("lamps", [broken]) == ("lamps", 3, 2, 1, 3.0, 2, "no_color 1")
+    assert lines_table([broken]).rows[0] == ("lamps", 3, 2, 1, 3.0, 2, "no_color 1")
 
 
 @settings(max_examples=25)
@@ -119,7 +119,7 @@ def test_seen_cells_are_clear_of_covers_and_in_the_picture() -> None:
 def test_a_view_without_the_white_cell_has_no_wrong_id(kind: str) -> None:
     results = [read_view(DrawnView(kind, 1, number)) for number in range(3)]
     assert not any(result.wrong_ids for result in results)
-    assert all(result.motions >= 1 and result.cells for result in results)
+    assert all(result.seen.motions >= 1 and result.seen.cells for result in results)
     assert results == [read_view(DrawnView(kind, 1, number)) for number in range(3)]
 
 

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.timing import timed
 from benchmarks.suites.scenes import shortest_edges, standard_layout
 from benchmarks.suites.scoring.score import (
     EMPTY_SCORE,
     MarkerScore,
     promised_markers,
     score_markers,
-    wrong_markers,
+    wrong_in_scene,
 )
 from benchmarks.suites.scoring.squares import PictureSquares, nearest_truth, picture_squares
 from benchmarks.suites.stress.conditions import BY_NAME, LARGE_PX
@@ -73,13 +73,6 @@ def render_plain_image(pattern: str) -> Image:
     return plain_frame(pattern, 0).shoot().image
 
 
-def time_extraction(extractor: Extractor, image: Image) -> tuple[Markers, float]:
-    """The markers, and the processor time in ms."""
-    started = time.process_time()
-    markers = extractor.extract(image)
-    return markers, 1e3 * (time.process_time() - started)
-
-
 def layout_layers(shot: CaseImage) -> int:
     """Layers of the layout to search: the scene's layers, or 11 in images without a pattern."""
     return int(shot.scene.layout.marker_layer.max()) if shot.scene else 11
@@ -103,10 +96,9 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
         for _ in range(1 if pixels > LARGE_PX else runs):
             plain_ms = math.nan
             if comparable:
-                plain_ms = time_extraction(
-                    cached_extractor(case.pattern, 11), render_plain_image(case.pattern)
-                )[1]
-            markers, ms = time_extraction(extractor, shot.image)
+                plain, image = cached_extractor(case.pattern, 11), render_plain_image(case.pattern)
+                plain_ms = timed(partial(plain.extract, image)).cpu_ms
+            markers, ms, _ = timed(partial(extractor.extract, shot.image))
             times_ms.append(ms)
             ratios.append(ms / plain_ms)
     except Exception as error:
@@ -117,14 +109,6 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
     squares = picture_squares(markers, nearest_truth(markers, shot.truths)) if shot.truths else {}
     result = CaseResult(case, score, min(times_ms), float(np.median(ratios)), reason, False, squares)
     return CaseReading(result, shot, markers)
-
-
-def warm_up() -> None:
-    """Load all modules before times are measured."""
-    import cv2
-
-    cv2.setNumThreads(1)
-    cached_extractor("honeycomb", 11).extract(render_plain_image("honeycomb"))
 
 
 def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
@@ -153,7 +137,7 @@ def find_wrong_markers(shot: CaseImage, markers: Markers) -> tuple[NDArray[np.bo
     """(M,) bool: the wrong markers, and the truth of the pattern with the fewest wrong markers."""
     assert shot.scene is not None
     layout = shot.scene.layout
-    both = [(wrong_markers(markers, layout, truth), truth) for truth in shot.truths]
+    both = [(wrong_in_scene(markers, layout, truth).any_kind, truth) for truth in shot.truths]
     return min(both, key=lambda one: int(one[0].sum()))
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api.calibration import calibrate_check
 from cmpdesign.cli.derived import derived
 from cmpdesign.cli.terminal import print_step, print_warning, say, say_columns
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.calibration import CalibrateCheckDocument
+    from cmpdesign.documents.calibration import CalibrateCheckDocument, ForceScalePart
 
 EXAMPLES = (
     "cmpdesign calibrate check index.toml pad.png",
@@ -22,8 +22,47 @@ EXIT_CHANGED = 1
 def check(done: CalibrateCheckDocument) -> int:
     """Exit code 1: the calibration does not hold."""
     print_step("the pictures are read")
+    _print_state(done)
     _print_figures(done)
     return 0 if done.holds else EXIT_CHANGED
+
+
+def _print_state(found: CalibrateCheckDocument) -> None:
+    for name, camera in found.cameras.items():
+        told = {key: value for key, value in camera.settings.items() if value is not None}
+        say(f"{name} answers: {', '.join(f'{key} {_shown(value)}' for key, value in told.items())}")
+        for note in camera.notes:
+            print_warning(f"{name}: {note}")
+    for name, view in found.views.items():
+        say(
+            f"light: {name} evenness {_shown(view.evenness)}, overexposed {_shown(view.clipping, '.1%')}, contrast "
+            f"{_shown(view.contrast, '.0f')}"
+        )
+        say(f"focus: {name} blur {_shown(view.blur_px, '.2f')} px")
+        say(f"markers read: {name} {view.share_read:.1%}")
+        for hint in view.hints:
+            print_warning(f"{name}: {hint}")
+    say(f"force: {_force_text(found.force)}")
+    ages = [
+        f"{name} without a date" if days is None else f"{name} {days} days ago"
+        for name, days in found.ages_days.items()
+    ]
+    say(f"calibrations: {', '.join(ages) or 'none'}")
+
+
+def _shown(value: Any, form: str = ".2f") -> str:
+    if value is None:
+        return "unknown"
+    if isinstance(value, tuple):
+        return "x".join(map(str, value))
+    return f"{value:{form}}" if isinstance(value, float) else str(value)
+
+
+def _force_text(force: ForceScalePart | None) -> str:
+    if force is None or force.young_mpa is None:
+        return "no Young's modulus in [elastomer], so that there are no forces: cmpdesign calibrate force"
+    gel = "without a gel: cmpdesign calibrate gel" if force.gel is None else f"gel {force.gel}, of this pad"
+    return f"Young's modulus {force.young_mpa:.3g} +- {force.young_sigma_mpa:.2g} MPa, {gel}"
 
 
 def _print_figures(found: CalibrateCheckDocument) -> None:
