@@ -1,4 +1,6 @@
-"""The vectors that the compiled loops use: the widest ones of the processor, with the same bits in every result."""
+"""How the compiled loops use the processor: its widest vectors, and two threads for large patterns. No bit of a result
+depends on it.
+"""
 
 from __future__ import annotations
 
@@ -14,3 +16,14 @@ def use_widest_vectors(is_widest: bool) -> bool:
         Whether the two differ on this processor.
     """
     return native.use_widest_vectors(is_widest)
+
+
+def use_parts_from(items: int) -> int:
+    """Run loops over so many items or more in two threads.
+
+    For tests: results do not depend on it.
+
+    Returns:
+        The number before.
+    """
+    return native.use_parts_from(items)

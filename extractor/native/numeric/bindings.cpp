@@ -1,6 +1,7 @@
 // Room "numeric" for Python.
 #include "base/binding.hpp"
 
+#include "base/parts.hpp"
 #include "base/processor.hpp"
 #include "numeric/bilinear.hpp"
 #include "numeric/gaussian.hpp"
@@ -33,6 +34,7 @@ void add_numeric(nb::module_ module) {
   bind<&normal_cdf>(module, "normal_cdf", {"z"});
   bind<&fill_corner_terms>(module, "fill_corner_terms", {"r", "out"});
   bind<&use_widest_vectors>(module, "use_widest_vectors", {"is_widest"});
+  bind<&use_parts_from>(module, "use_parts_from", {"items"});
   bind<&wedge_correlation>(module, "wedge_correlation", {"squares", "product", "corner"});
 }
 

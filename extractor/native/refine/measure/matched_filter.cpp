@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/parts.hpp"
 #include "refine/measure/filter_rows.hpp"
 #include "refine/synthesis/gridline_sides.hpp"
 #include "refine/synthesis/gridlines.hpp"
@@ -140,14 +141,14 @@ void fill_bending_sums(const RowSums& sums, Index begin, Index end, double sigma
 class ProfileReader {
  public:
   ProfileReader(const image::PyramidLevel& view, View<const double, 2> lines, double sigma,
-                View<const bool, 1> is_bending, const MatchedFilterLimits& limits)
+                View<const bool, 1> is_bending, const MatchedFilterLimits& limits, View<double, 2> out)
       : image_{view.image.flat(), view.response.encoded, static_cast<float>(1.0 / sigma)},
         lines_(lines),
         is_bending_(is_bending),
         sigma_(sigma),
         limits_(limits),
         held_(std::make_unique<HeldGridlines>()),
-        out_({lines.size(), SUMS}, 0.0) {}
+        out_(out) {}
 
   void add(Index e, const RowChoice& choice, const RowFrame& frame, View<const double, 1> side) {
     if (held_->begin[held_->count] + choice.count > MAX_FILTER_ROWS) read();
@@ -162,13 +163,7 @@ class ProfileReader {
     ++own.count;
   }
 
-  Array<double, 2> sums() {
-    read();
-    return std::move(out_);
-  }
-
- private:
-  // fills in the sums of the gridlines in the buffers, which are empty afterwards
+  // Fills in the sums of the gridlines in the buffers, which are empty afterwards.
   void read() {
     HeldGridlines& own = *held_;
     const auto is_bending = [&](Index e) { return is_bending_[e]; };
@@ -183,13 +178,14 @@ class ProfileReader {
     own.count = 0;
   }
 
+ private:
   FilterImage image_;
   View<const double, 2> lines_;
   View<const bool, 1> is_bending_;
   double sigma_;
   MatchedFilterLimits limits_;
   std::unique_ptr<HeldGridlines> held_;
-  Array<double, 2> out_;
+  View<double, 2> out_;
 };
 
 // The rows across a gridline between its corners, `most` at most; clearance (4,).
@@ -223,14 +219,18 @@ Array<double, 2> read_profiles(const image::PyramidLevel& view, View<const doubl
                                Index most, const MatchedFilterLimits& limits) {
   const Index height = view.image.size(0), width = view.image.size(1);
   const ImageArea area{0, 0, width, height};
-  ProfileReader reader(view, lines, sigma, is_bending, limits);
-  for (Index e = 0; e < lines.size(); ++e) {
-    if (lines(e, KNOWN) == 0.0 || across.clearance(e, SQUARED_CONTRAST) == 0.0) continue;
-    const RowFrame frame = row_frame(lines, e, area, width);
-    const RowChoice choice = choose_rows(frame, across.clearance[e], sigma, most, limits);
-    if (choice.count > 0) reader.add(e, choice, frame, across.sides[e]);
-  }
-  return reader.sums();
+  Array<double, 2> out({lines.size(), SUMS}, 0.0);
+  in_parts(lines.size(), lines.size(), [&](Index begin, Index end) {
+    ProfileReader reader(view, lines, sigma, is_bending, limits, out);
+    for (Index e = begin; e < end; ++e) {
+      if (lines(e, KNOWN) == 0.0 || across.clearance(e, SQUARED_CONTRAST) == 0.0) continue;
+      const RowFrame frame = row_frame(lines, e, area, width);
+      const RowChoice choice = choose_rows(frame, across.clearance[e], sigma, most, limits);
+      if (choice.count > 0) reader.add(e, choice, frame, across.sides[e]);
+    }
+    reader.read();
+  });
+  return out;
 }
 
 }  // namespace cmp::refine

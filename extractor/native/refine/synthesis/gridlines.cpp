@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/parts.hpp"
 #include "localmap/local_map.hpp"
 
 namespace cmp::refine {
@@ -106,15 +107,17 @@ Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> whi
                                View<const double, 3> stencil, const GridlineLimits& limits) {
   Array<double, 3> maps({xy.size(), 2, 5}, NOT_A_NUMBER);
   const auto out = maps.view();
-  for (Index m = 0; m < xy.size(); ++m) {
-    if (!which[m]) continue;
-    const bool has_stencil = stencil(m, 0, 0) != 0.0 || stencil(m, 1, 0) != 0.0;
-    if (has_stencil) fill_derivatives(xy, m, near[m], stencil[m], out[m]);
-    if (!std::isfinite(out(m, 0, 0))) {
-      out[m].fill(NOT_A_NUMBER);
-      fill_quadratic_derivatives(xy, m, near[m], offset[m], out[m], limits);
+  in_parts(xy.size(), 3 * xy.size(), [&](Index begin, Index end) {  // a marker has three gridlines
+    for (Index m = begin; m < end; ++m) {
+      if (!which[m]) continue;
+      const bool has_stencil = stencil(m, 0, 0) != 0.0 || stencil(m, 1, 0) != 0.0;
+      if (has_stencil) fill_derivatives(xy, m, near[m], stencil[m], out[m]);
+      if (!std::isfinite(out(m, 0, 0))) {
+        out[m].fill(NOT_A_NUMBER);
+        fill_quadratic_derivatives(xy, m, near[m], offset[m], out[m], limits);
+      }
     }
-  }
+  });
   return maps;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/parts.hpp"
 #include "image/response.hpp"
 #include "numeric/median.hpp"
 
@@ -174,15 +175,17 @@ Array<double, 2> cell_means(View<const std::uint8_t, 3> image, View<const float,
   const Index height = image.size(0), width = image.size(1);
   const auto right = static_cast<double>(width - 1), bottom = static_cast<double>(height - 1);
   Array<double, 2> out({cells.size(), 4}, 0.0);
-  for (Index i = 0; i < cells.size(); ++i) {
-    const CellCorners corners(xy, cells, i);
-    const double x = corners.middle_x(), y = corners.middle_y();
-    if (!(x >= 0.0 && y >= 0.0 && x <= right && y <= bottom)) continue;
-    const Disc disc{x, y, disc_radius(inscribed_radius(corners), sigma, limits)};
-    const auto mean = images.drawn.size() > 0 ? disc_mean<true>(disc, images, height, width)
-                                              : disc_mean<false>(disc, images, height, width);
-    std::copy(mean.begin(), mean.end(), out[i].begin());
-  }
+  in_parts(cells.size(), 3 * cells.size(), [&](Index begin, Index end) {  // a cell has three gridlines
+    for (Index i = begin; i < end; ++i) {
+      const CellCorners corners(xy, cells, i);
+      const double x = corners.middle_x(), y = corners.middle_y();
+      if (!(x >= 0.0 && y >= 0.0 && x <= right && y <= bottom)) continue;
+      const Disc disc{x, y, disc_radius(inscribed_radius(corners), sigma, limits)};
+      const auto mean = images.drawn.size() > 0 ? disc_mean<true>(disc, images, height, width)
+                                                : disc_mean<false>(disc, images, height, width);
+      std::copy(mean.begin(), mean.end(), out[i].begin());
+    }
+  });
   return out;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/parts.hpp"
 #include "base/processor.hpp"
 #include "refine/synthesis/cell_coverage.hpp"
 #include "refine/synthesis/gridlines.hpp"
@@ -143,12 +144,18 @@ class CellDrawing {
 
 void draw_cells(const CellGeometry& geometry, const CellAppearance& appearance,
                 View<const std::int64_t, 1> box, View<float, 3> model) {
-  const auto drawing = std::make_unique<CellDrawing>(geometry, appearance, box, model);
   const auto lines = geometry.lines;
-  for (Index i = 0; i < geometry.cells.size(); ++i) {
-    const auto edges = geometry.cell_edges[i];
-    if (lines(edges[0], KNOWN) * lines(edges[1], KNOWN) * lines(edges[2], KNOWN) > 0.0) drawing->draw(i);
-  }
+  const Index top = box[1];
+  // every pixel belongs to one part, which adds the cells in their order
+  in_parts(box[3] - top, geometry.edges.size(), [&](Index begin, Index end) {
+    const std::array<std::int64_t, 4> band{box[0], top + begin, box[2], top + end};
+    const View<const std::int64_t, 1> rows(band.data(), {4});
+    const auto drawing = std::make_unique<CellDrawing>(geometry, appearance, rows, model);
+    for (Index i = 0; i < geometry.cells.size(); ++i) {
+      const auto edges = geometry.cell_edges[i];
+      if (lines(edges[0], KNOWN) * lines(edges[1], KNOWN) * lines(edges[2], KNOWN) > 0.0) drawing->draw(i);
+    }
+  });
 }
 
 }  // namespace cmp::refine

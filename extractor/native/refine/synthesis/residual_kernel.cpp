@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "base/parts.hpp"
 #include "refine/synthesis/residual_sums.hpp"
 #include "refine/synthesis/station_sums.hpp"
 
@@ -88,8 +89,10 @@ ResidualSums accumulate_residual_sums(const image::PyramidLevel& view, View<cons
                                       const PixelRowLimits& limits) {
   const Index edges = drawn.lines.size();
   ResidualSums out{Array<double, 2>({edges, SUMS}), Array<double, 3>({edges, stations, STATION_SUMS})};
-  ResidualReader reader(view, model, drawn, sigma, box, limits);
-  for (Index e = 0; e < edges; ++e) reader.read(e, out.ends[e], out.stations[e]);
+  in_parts(edges, edges, [&](Index begin, Index end) {
+    ResidualReader reader(view, model, drawn, sigma, box, limits);
+    for (Index e = begin; e < end; ++e) reader.read(e, out.ends[e], out.stations[e]);
+  });
   return out;
 }
 
