@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     from cmpdesign.inputs.cameras import CameraSettings as CameraSettings
     from cmpdesign.layout.checks import check_design as check_design
     from cmpdesign.products.drawing.svg import write_svg as write_svg
-    from cmpdesign.proposal.camera_design import size as size
+    from cmpdesign.proposal.sizing import size as size
     from cmpdesign.runtime.health import Health as Health
     from cmpdesign.runtime.opening import Sensors as Sensors
     from cmpdesign.runtime.opening import open_sensor as open_sensor
@@ -145,7 +145,7 @@ _HOMES = {
     "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
     "schema": "cmpdesign.api.making",
-    "size": "cmpdesign.proposal.camera_design",
+    "size": "cmpdesign.proposal.sizing",
     "templates": "cmpdesign.api.making",
     "track": "cmpdesign.api.sequences",
     "verify": "cmpdesign.api.verifying",

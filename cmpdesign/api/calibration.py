@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
 from cmpdesign.inputs.options import Preset, Response, Side, Written
-from cmpdesign.watch import tell
+from cmpdesign.watch import tell, warn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from extractor import LayoutLike, LearntLayout, Markers, Reference, Rig
 
 MAX_WAY_MM = 100  # of a step
+# RMS per axis; well above the scatter of a made pad (0.01), below that of a round pattern read as honeycomb (0.2).
+MAX_USUAL_SCATTER_PITCHES = 0.1
 
 
 def calibrate_camera(
@@ -179,13 +181,27 @@ def _pattern_document(learnt: LearntLayout, written: str) -> CalibratePatternDoc
     made, worst = learnt.layout.as_made, int(learnt.picture_z.argmax())
     assert made is not None and made.covariance_mm2 is not None
     variance = made.covariance_mm2[learnt.measured].trace(axis1=1, axis2=2) / 2
+    ends_mm = learnt.layout.xy_mm[learnt.layout.edges]
+    scatter = learnt.scatter_mm / float(np.linalg.norm(ends_mm[:, 1] - ends_mm[:, 0], axis=1).mean())
+    if scatter > MAX_USUAL_SCATTER_PITCHES:
+        warn(
+            f"the markers lie {scatter:.2f} pitches per axis from their nominal places, limit "
+            f"{MAX_USUAL_SCATTER_PITCHES:g}; check that {parameter('layout')} is this pad's, unless the lens "
+            "distorts strongly"
+        )
+    present, measured = int(learnt.layout.present.sum()), int(learnt.measured.sum())
+    if measured < present:
+        warn(
+            f"{present - measured} of {present} markers are measured in no picture and stay at their "
+            "nominal places; show the whole pad in some pictures"
+        )
     return CalibratePatternDocument.of(
         learnt,
         written=written,
         pictures=len(learnt.picture_z),
         side=made.side,
-        present=int(learnt.layout.present.sum()),
-        measured=int(learnt.measured.sum()),
+        present=present,
+        measured=measured,
         residual_z=float(learnt.z),
         worst_picture=worst,
         worst_picture_z=float(learnt.picture_z[worst]),

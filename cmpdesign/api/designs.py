@@ -122,10 +122,7 @@ class Design(Parameters):
         """The pattern, its key figures and its findings, for notebooks."""
         report = self.report
         rows = {
-            "pattern": f"{report.pattern}, {report.layers} layers, pitch {report.pitch_mm:.4g} mm",
-            "markers": str(report.present_markers),
-            "size": "{:.2f} x {:.2f} mm".format(*report.size_mm),
-            "smallest feature": f"{report.smallest_feature_mm:.3f} mm",
+            **report.figures(),
             "digest": report.digest[:12],
             **{f"{finding.severity} {i}": str(finding) for i, finding in enumerate(report.findings, 1)},
         }

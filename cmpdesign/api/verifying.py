@@ -14,7 +14,7 @@ from cmpdesign.files.atomic import write_file
 from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
 from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written
 from cmpdesign.inputs.texts import one_line, visible
-from cmpdesign.watch import tell, told
+from cmpdesign.watch import notice, tell, told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -184,6 +184,7 @@ def verify(
         verdict = files.judged(source)
         if verdict is not None:
             on_verdict(visible(source.name), verdict)
+            notice(f"{visible(source.name)}: {verdict.line()}")
         found = _unread(source) if verdict is None else verdict.to_json()
         parts.append({"image": visible(source.name), **found})
     document = _document(judge, parts, verdict if is_one and len(parts) == 1 else None)

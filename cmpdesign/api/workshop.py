@@ -74,7 +74,7 @@ def _naming(photo: str | Path) -> Iterator[None]:
 def evaluate(
     experiment: Literal["precision", "response", "reliability", "angles", "designs"],
     output: Annotated[str | Path, Written(metavar="DIR")],
-    designs: Mapping[str, Parameters] | None = None,
+    designs: Mapping[str, Parameters] | Sequence[str | Path] = (),
     *,
     trials: Annotated[int | None, Written(least=1)] = None,
     seed: Annotated[int, Written(least=0)] = 0,
@@ -89,7 +89,7 @@ def evaluate(
     Args:
         experiment: the command's name.
         output: folder for the report and the journal; or of an interrupted run, which is continued.
-        designs: name -> design; for "designs" only.
+        designs: name -> design, or names of templates and TOML files; for "designs" only.
         trials: places for every contact, object or mode; None: the command's default.
         seed: seed of all random values: the same seed gives the same figures.
         workers: number of processes; None: one for each core.
@@ -100,7 +100,8 @@ def evaluate(
         The written files, and the JSON object of report.json.
 
     Raises:
-        CmpDesignError: a value out of range, or the folder holds a run under other conditions.
+        CmpDesignError: a value out of range, two designs of one name, or the folder holds a run under other
+            conditions.
         OutputError: a file cannot be written; finished trials are kept.
     """
     from cmpdesign.documents.runs import EvaluateDocument
@@ -112,12 +113,27 @@ def evaluate(
 
     if preset not in PRESETS:
         raise CmpDesignError(f"preset {preset}: unknown; there are {', '.join(PRESETS)}")
-    compared = design_entries(designs or {}) if experiment == "designs" else ()
+    compared = design_entries(_by_name(designs)) if experiment == "designs" else ()
     found = experiments.find_experiment(experiment, compared)
     count = USUAL_TRIALS[experiment] if trials is None else trials
     options = RunOptions(count, seed, load_sensor(sensor).text, preset, workers or os.cpu_count() or 1)
     report, files = experiments.run_experiment(found, options, Path(output))
     return EvaluateDocument(written=tuple(map(str, files)), report=report)
+
+
+def _by_name(designs: Mapping[str, Parameters] | Sequence[str | Path]) -> Mapping[str, Parameters]:
+    """Designs under the stems of their names."""
+    from cmpdesign.design.design import load_design
+
+    if isinstance(designs, Mapping):
+        return designs
+    loaded: dict[str, Parameters] = {}
+    for given in designs:
+        name = Path(given).stem
+        if name in loaded:
+            raise CmpDesignError(f"two designs are called {name!r}; rename one of the files")
+        loaded[name] = load_design(given)
+    return loaded
 
 
 def export_lerobot(

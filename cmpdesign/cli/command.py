@@ -6,19 +6,21 @@ import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
 
-from cmpdesign.cli.mode import Mode, current_mode, use_mode
-from cmpdesign.cli.options.output import NAMES, output_parameters
 from cmpdesign.cli.terminal import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
+    Mode,
+    current_mode,
     is_expected,
     print_error,
     print_origin,
+    use_mode,
 )
 from cmpdesign.errors import CmpDesignError, spelled
 from cmpdesign.inputs.texts import shortened, visible
@@ -34,7 +36,36 @@ PURPOSES = {
     "For other programs": "schema",
 }
 _ARGUMENT_TYPE = re.compile(r"^(  [A-Z]+)( <[^>]+>)", re.MULTILINE)
-_OUTPUT_PARAMETERS = output_parameters()
+
+
+_carrier = typer.Typer(add_completion=False)
+
+
+@_carrier.command()
+def _carry(
+    as_json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            help="Print one JSON document in place of text, and errors and warnings as JSON lines on stderr.",
+        ),
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print errors and warnings only; no progress.")
+    ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose",
+            "-v",
+            help="Also print each step with its time, and the place in the code where an error arose.",
+        ),
+    ] = False,
+) -> None:
+    """Carries the options of every command, in the order of ``Mode``."""
+
+
+OUTPUT_OPTIONS = [each for each in get_command(_carrier).params if each.name in Mode._fields]
 
 
 def examples(*lines: str) -> str:
@@ -57,7 +88,7 @@ class Command(TyperCommand):
     """
 
     def __init__(self, name: str | None, *, params: list[Any] | None = None, **options: Any) -> None:
-        super().__init__(name, params=[*(params or []), *_OUTPUT_PARAMETERS], **options)
+        super().__init__(name, params=[*(params or []), *OUTPUT_OPTIONS], **options)
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         _write_examples(self.epilog, formatter)
@@ -67,7 +98,7 @@ class Command(TyperCommand):
         return _ARGUMENT_TYPE.sub(lambda found: found[1] + " " * len(found[2]), super().get_help(ctx))
 
     def invoke(self, ctx: Any) -> Any:
-        mode = Mode(*(ctx.params.pop(name) for name in NAMES))
+        mode = Mode(*(ctx.params.pop(name) for name in Mode._fields))
         excluded = mode.quiet and mode.verbose
         use_mode(mode._replace(verbose=mode.verbose and not excluded))
         if excluded:
@@ -178,3 +209,16 @@ def exit_interrupted() -> None:
     """End the program after Ctrl-C outside of commands."""
     print_error(INTERRUPTED, EXIT_INTERRUPTED)
     sys.exit(EXIT_INTERRUPTED)
+
+
+app = typer.Typer(
+    cls=OneLineErrors,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # markup would remove text in brackets from a help text
+    help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.\n\n"
+    "Exit codes: 0 done; 1 done, with a negative verdict or an early end; 2 bad input, or a file that cannot be "
+    "written; 130 stopped by Ctrl-C.",
+    epilog=examples("cmpdesign build tac3d -o mine", "cmpdesign verify --help"),
+)

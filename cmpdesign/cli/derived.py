@@ -14,20 +14,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, TypeVar, Union, Unpack, get_args, get_origin
+from typing import Annotated, Any, Union, Unpack, get_args, get_origin
 
 import typer
 
+from cmpdesign.cli.command import Command, examples
 from cmpdesign.cli.options.completions import COMPLETIONS
 from cmpdesign.cli.options.texts import parse_pairs, parse_pixels, parse_reading_response
 from cmpdesign.cli.progress import working
-from cmpdesign.cli.terminal import finish
+from cmpdesign.cli.terminal import finish, print_written
 from cmpdesign.inputs.options import Response, Usual, Written, options_of
 from cmpdesign.tracking.jobs.options import SequenceOptions
-from cmpdesign.watch import watched
 
 Run = Callable[..., Any]
-Takes = TypeVar("Takes", bound=Run)
 Parse = Callable[[Any], Any]
 LAYOUT = "the pattern's layout.json"
 _ENTRY = re.compile(r"^    (?:    )?(\w+(?:, \w+)*): (.*(?:\n {8,}\S.*)*)", re.MULTILINE)
@@ -56,32 +55,54 @@ class _Taken:
     is_key: bool = False
 
 
-def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Callable[[Takes], Run]:
-    """Give a command the parameters of a call.
+def command(
+    group: typer.Typer, call: Callable[..., Any], doing: str, *shown: str, **how: Any
+) -> Callable[[Run], Run]:
+    """Add a command to a group.
 
     Args:
-        call: the call, whose docstring describes parameters and the command.
-        doing: what the call does, for the progress; empty: the command's function calls it.
+        group: the group.
+        call, doing, how: see ``derived``.
+        shown: the command's examples.
+    """
+
+    def decorated(run: Run) -> Run:
+        group.command(cls=Command, epilog=examples(*shown))(derived(call, doing, **how)(run))
+        return run
+
+    return decorated
+
+
+def derived(
+    call: Callable[..., Any], doing: str, calling: Run | None = None, **arguments: Any
+) -> Callable[[Run], Run]:
+    """Give a command the parameters of a call, whose docstring describes parameters and the command.
+
+    Args:
+        call: the call.
+        doing: what the call does, for the progress.
+        calling: called in place of the call; its keyword-only parameters are further options, flags last.
         arguments: parameter of the call -> another help text; None: the command does not have the parameter.
 
-    With ``doing``, the call's record goes to the command's function, which prints the record for people and may return
-    an exit code; with ``--json`` the record is printed. Without it, the function receives all values as keywords. The
-    function's own keyword-only parameters are further options, flags last. Its docstring follows the first sentence of
-    the call's.
+    The call's record goes to the command's function, which prints the record for people and may return an exit code;
+    a parameter ``given`` of the function gets the values of the call. With ``--json`` the record is printed. The
+    docstring of the function follows the first sentence of the call's.
     """
     left_out = {name for name, words in arguments.items() if words is None}
     taken = [each for each in _taken(call) if each.name not in left_out]
     taken.sort(key=lambda each: 0 if each.is_argument else 1 if each.name == "output" else 2)
     meanings = _meanings(call) | {name: words for name, words in arguments.items() if words is not None}
 
-    def decorated(run: Takes) -> Run:
+    def decorated(run: Run) -> Run:
+        own = {} if calling is None else inspect.signature(calling).parameters
         extra = [
-            each.replace(annotation=_evaluated(each.annotation, run.__globals__))
-            for each in inspect.signature(run).parameters.values()
+            each.replace(annotation=_evaluated(each.annotation, getattr(calling, "__globals__", {})))
+            for each in own.values()
             if each.kind is each.KEYWORD_ONLY
         ]
         parsers = {each.name: _parser(each) for each in taken}
         keys = {each.name for each in taken if each.is_key}
+        takes_given = "given" in inspect.signature(run).parameters
 
         def command(ctx: typer.Context, **values: Any) -> None:
             values = {
@@ -89,14 +110,10 @@ def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Call
                 for name, each in values.items()
                 if name not in keys or _is_given(ctx, name)
             }
-            if not doing:
-                run(**values)
-                return
-            own = {each.name: values.pop(each.name) for each in extra}
-            with working(doing) as steps, watched(steps.tell):
-                done = call(**values)
-            exit_code = run(done, **own) or 0
-            finish(lambda: done, exit_code)
+            with working(doing):
+                done = (calling or call)(**values)
+            print_written(done)
+            finish(done, (run(done, given=values) if takes_given else run(done)) or 0)
 
         of_call = [_parameter(each, meanings) for each in taken]
         placed = sum(each.is_argument for each in taken) + any(each.name == "output" for each in taken)
@@ -229,7 +246,8 @@ def _is_union(kind: Any) -> bool:
 
 
 def _is_pixels(kind: Any) -> bool:
-    return any(get_origin(each) is tuple for each in _members(kind))
+    """Whether values are sizes that the call does not take as texts."""
+    return str not in _members(kind) and any(get_origin(each) is tuple for each in _members(kind))
 
 
 def _written_type(taken: _Taken) -> Any:
@@ -245,7 +263,8 @@ def _written_type(taken: _Taken) -> Any:
             len(members) == 1 and not _is_mapping(several[0]) and Path in _members(get_args(several[0])[0])
         )
         return list[Path] if is_of_files else list[str]
-    if set(members) == set(get_args(Response)) or _is_pixels(taken.kind) or {str, int} <= set(members):
+    is_text = str in members and any(each in (int, float) or get_origin(each) is tuple for each in members)
+    if set(members) == set(get_args(Response)) or _is_pixels(taken.kind) or is_text:
         kind: Any = str
     elif Path in members or _PythonOnly in members:
         kind = Path

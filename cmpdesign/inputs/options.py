@@ -13,6 +13,7 @@ from cmpdesign.errors import CmpDesignError, parameter
 Preset = Literal["balanced", "accurate"]
 Side = Literal["designed", "front", "back", "either"]
 Channels = Literal["bgr", "rgb"]
+Make = Literal["laser", "mold", "print"]
 Response = Literal["srgb", "linear"] | float
 Options = TypeVar("Options")
 

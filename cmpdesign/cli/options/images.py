@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
-
-LayoutArgument = Annotated[Path, typer.Argument(metavar="LAYOUT", help="The pattern's layout.json.")]
 
 SourcesArgument = Annotated[
     list[str],

@@ -43,7 +43,7 @@ def test_the_command_draws_pictures_videos_and_folders(
 ) -> None:
     folder, film, truth = tmp_path / "frames", tmp_path / "film.mkv", tmp_path / "truth.npz"
     code, said = run(MOVING, "-o", folder, "--truth", truth)
-    assert code == 0 and "5 frames of 96 x 80 px at 4 fps" in said
+    assert code == 0 and "size 96 x 80 px" in said and "frames 5 fps 4" in said
     pictures = [cv2.imread(str(path)) for path in sorted(folder.iterdir())]
     expected = [render(scene, size=SIZE) for scene in scene_writer(tmp_path, layout)(MOVING).scenes()]
     assert len(load_truths(truth)[0]) == len(pictures) == 5

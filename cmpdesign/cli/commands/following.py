@@ -1,0 +1,105 @@
+"""Sequences followed into files: ``track`` and ``reconstruct``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from cmpdesign.api import sequences
+from cmpdesign.cli.command import app
+from cmpdesign.cli.derived import command
+from cmpdesign.cli.records import print_rows
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_warning, say, say_text
+
+if TYPE_CHECKING:
+    from cmpdesign.documents.runs import ReconstructDocument, RecoverDocument, TrackDocument
+
+EXIT_NOT_TRACKED = 1
+RecoverOption = Annotated[
+    bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
+]
+
+
+def _followed(call: Callable[..., Any], of: Literal["track", "reconstruct"]) -> Callable[..., Any]:
+    """The call, which Ctrl-C ends after a frame; with ``--recover`` its file is completed instead."""
+
+    def calling(*, recover: RecoverOption = False, **values: Any) -> Any:
+        from cmpdesign.tracking.run import StopRequest, stop_on_signal
+
+        if recover:
+            return sequences.recover_run(values["layout"], values["output"], of)
+        with stop_on_signal(StopRequest()):
+            return call(**values)
+
+    return calling
+
+
+@command(
+    app,
+    sequences.track,
+    "tracking",
+    "cmpdesign track layout.json frames -o run.npz",
+    "cmpdesign track layout.json press.mp4 -o run.csv --overlay found.mp4 --frames 100",
+    calling=_followed(sequences.track, "track"),
+    on_frame=None,
+)
+def track(done: TrackDocument | RecoverDocument, given: Mapping[str, Any]) -> int:
+    """Exit code: 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
+    if done.format == "cmp-recovery":
+        return _recovered(done, given)
+    from cmpdesign.reading.quality import reasons_text
+
+    print_rows(
+        done,
+        "frames starts marker_shares time_ms frames_per_s jitter_px reasons quality contact largest_displacement",
+        reasons=reasons_text(done.reasons),
+    )
+    quiver = given.get("quiver")
+    if quiver is not None and str(quiver) not in done.written:
+        print_warning(f"{quiver} is not drawn: no frame has a displacement")
+    return _exit_code(done)
+
+
+@command(
+    app,
+    sequences.reconstruct,
+    "reconstructing",
+    "cmpdesign reconstruct layout.json rig.toml rest.png frames -o run.npz",
+    "cmpdesign reconstruct layout.json rig.toml 0 press.avi -o run.csv --frames 100",
+    calling=_followed(sequences.reconstruct, "reconstruct"),
+    on_frame=None,
+)
+def reconstruct(done: ReconstructDocument | RecoverDocument, given: Mapping[str, Any]) -> int:
+    """Positions, displacements and normals in mm. Exit code: 0 done, 1 ended early or nothing found, 2 bad input."""
+    if done.format == "cmp-recovery":
+        return _recovered(done, given)
+    print_rows(
+        done,
+        "frames views marker_shares positions lost_markers reasons sigma_um systematic_um largest_displacement contact "
+        "time_ms",
+    )
+    return _exit_code(done)
+
+
+def _recovered(done: RecoverDocument, given: Mapping[str, Any]) -> int:
+    for problem in done.problems:
+        print_warning(problem)
+    if done.frames:
+        say(f"{done.frames} frames recovered")
+        return 0
+    print_warning(f"{given['output']}: the run ended before its first frame; the unfinished file is removed")
+    return EXIT_NOT_TRACKED
+
+
+def _exit_code(done: TrackDocument | ReconstructDocument) -> int:
+    """1 if the run ended early or tracked nothing, 130 if it was stopped by hand, else 0."""
+    run = done.found
+    if run.stop.is_requested:
+        return 0 if run.source.is_live else EXIT_INTERRUPTED
+    if run.source.is_live:
+        say_text(f"{done.times.text}\n")
+    if done.ended_early:
+        print_warning(f"{done.ended_early}; the frames until then are written")
+    return EXIT_NOT_TRACKED if done.ended_early or not done.frames.tracked else 0
