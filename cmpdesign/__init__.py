@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from cmpdesign.runtime.sensor import LateError as LateError
     from cmpdesign.runtime.sensor import Sensor as Sensor
     from cmpdesign.runtime.zero import TouchedError as TouchedError
+    from cmpdesign.tracking.jobs.options import ReadingOptions as ReadingOptions
     from cmpdesign.tracking.jobs.options import SequenceOptions as SequenceOptions
     from cmpdesign.tracking.jobs.options import ShapeOptions as ShapeOptions
     from cmpdesign.tracking.jobs.options import TrackOptions as TrackOptions
@@ -107,6 +108,7 @@ _HOMES = {
     "SensorFrame": "cmpdesign.runtime.result",
     "SensorFrames": "cmpdesign.runtime.result",
     "Sensors": "cmpdesign.runtime.opening",
+    "ReadingOptions": "cmpdesign.tracking.jobs.options",
     "SequenceOptions": "cmpdesign.tracking.jobs.options",
     "ShapeOptions": "cmpdesign.tracking.jobs.options",
     "TouchedError": "cmpdesign.runtime.zero",

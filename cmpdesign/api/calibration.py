@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cmpdesign.calibration.camera import CameraCalibration
-    from cmpdesign.calibration.rig.calibration import RigCalibration
-    from cmpdesign.calibration.rig.check import SensorCheck
     from cmpdesign.documents.calibration import (
         CalibrateCameraDocument,
         CalibrateCheckDocument,
@@ -91,35 +88,27 @@ def calibrate_camera(
     if response is None and all(picture.dtype.itemsize == 1 for picture in pictures):
         used, calibration = likely_response(calibration, read)
     written = () if output is None else _write_camera(calibration, used, Path(output), names)
-    return CalibrateCameraDocument.of(
-        calibration, written=written, response=used, **_camera_figures(calibration, found.unread)
-    )
-
-
-def _camera_figures(found: CameraCalibration, unread: Mapping[str, str]) -> dict[str, Any]:
-    """The fields of ``CalibrateCameraDocument`` that describe the camera and its pictures."""
-    view, names = found.camera, found.model.names
+    view, parameters = calibration.camera, calibration.model.names
     values = view.focal_px + view.centre_px + view.distortion
-    pictures = [
-        {"picture": one.name, "points": one.points, "rms_px": one.rms_px, "cause": one.cause}
-        for one in found.pictures
-    ]
-    pictures += [
+    deviations = calibration.cov.diagonal() ** 0.5
+    unread = [
         {"picture": name, "points": 0, "rms_px": None, "cause": f"not read: {reason}"}
-        for name, reason in unread.items()
+        for name, reason in found.unread.items()
     ]
-    return {
-        "size_px": found.adjusted.problem.size_px,
-        "model": found.model.name,
-        "parameters": dict(zip(names, values, strict=True)),
-        "deviations": dict(zip(names, map(float, found.cov.diagonal() ** 0.5), strict=True)),
-        "rms_px": found.rms_px,
-        "scale": found.adjusted.base,
-        "sheet_bend_mm": found.bend_mm,
-        "further_view": found.advice.text,
-        "further_view_ray_px": found.advice.ray_px,
-        "pictures": pictures,
-    }
+    return CalibrateCameraDocument.of(
+        calibration,
+        written=written,
+        response=used,
+        size_px=found.size_px,
+        model=calibration.model.name,
+        scale=calibration.adjusted.base,
+        sheet_bend_mm=calibration.bend_mm,
+        further_view=calibration.advice.text,
+        further_view_ray_px=calibration.advice.ray_px,
+        parameters=dict(zip(parameters, values, strict=True)),
+        deviations=dict(zip(parameters, deviations.tolist(), strict=True)),
+        pictures=[*calibration.pictures, *unread],
+    )
 
 
 def calibrate_pattern(
@@ -248,6 +237,7 @@ def calibrate_rig(
 
     from cmpdesign.api.layouts import reference_from
     from cmpdesign.calibration.rig.calibration import calibrate_rig_markers
+    from cmpdesign.documents.calibration import CalibrateRigDocument
     from cmpdesign.sensor.sensor_file import load_sensor_file
 
     ways = dict(steps or {})
@@ -277,34 +267,12 @@ def calibrate_rig(
         dated = [name for whole in names[: len(given)] for name in whole.split(",")]
         text = calibrated_text(sensor, calibration, reference, len(given), tuple(ways), _date_of(dated))
         write_file(Path(output), text)
-    return _rig_document(calibration, str(output or ""), len(given), tuple(ways))
-
-
-def _rig_document(
-    found: RigCalibration, written: str, pictures: int, steps_mm: tuple[float, ...]
-) -> CalibrateRigDocument:
-    from cmpdesign.documents.calibration import CalibrateRigDocument
-
-    names = found.names[: len(found.values)]
-    mirrors = [
-        {
-            "views": pair.views,
-            "normals": tuple(tuple(plane.normal.tolist()) for plane in pair.planes),
-            "distances_mm": tuple(plane.distance_mm for plane in pair.planes),
-            "angle_deg": pair.angle_deg,
-            "shift_mm": pair.shift_mm,
-        }
-        for pair in found.mirrors
-    ]
     return CalibrateRigDocument.of(
-        found,
-        written=written,
-        pictures=pictures,
-        steps_mm=steps_mm,
-        parameters=dict(zip(names, found.values.tolist(), strict=True)),
-        stated=dict(zip(names, found.stated.tolist(), strict=True)),
-        deviations=dict(zip(found.names, found.deviations.tolist(), strict=True)),
-        mirrors=mirrors,
+        calibration,
+        written=str(output or ""),
+        pictures=len(given),
+        steps_mm=tuple(ways),
+        **calibration.by_name(),
     )
 
 
@@ -346,34 +314,13 @@ def calibrate_check(
     found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
     before = file.table.calibration.rig
     stated = before.rms_px if before is not None and len(before.rms_px) == len(file.rig.views) else ()
-    checked = check_markers(
+    return check_markers(
         reference,
         file.rig,
-        found,
+        dict(zip(names, found, strict=True)),
         stated_px=dict(zip(file.rig.names, stated, strict=False)),
         scale=before.scale if before is not None else 1.0,
         limit_px=file.table.limits.max_rest_error_px,
-    )
-    return _check_document(checked, names)
-
-
-def _check_document(found: SensorCheck, names: Sequence[str]) -> CalibrateCheckDocument:
-    from cmpdesign.documents.calibration import CalibrateCheckDocument
-
-    causes = [
-        {
-            "cause": one.cause,
-            "left": one.left,
-            "changes": dict(one.changes),
-            "likely": one.cause in found.likely,
-        }
-        for one in found.causes
-    ]
-    return CalibrateCheckDocument.of(
-        found,
-        picture_misfits=dict(zip(names, found.picture_misfits, strict=True)),
-        causes=causes,
-        depth_error=found.depth_error if isfinite(found.depth_error) else None,
     )
 
 

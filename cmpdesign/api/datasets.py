@@ -4,28 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Unpack
 
 from cmpdesign.errors import CmpDesignError, parameter
-from cmpdesign.inputs.options import Channels, Preset, Response, Side, Usual, Written, settled
+from cmpdesign.inputs.options import Written, settled
+from cmpdesign.tracking.jobs.options import ReadingOptions
 
 if TYPE_CHECKING:
     from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from extractor import LayoutLike
-
-
-class ReadingOptions(TypedDict, total=False):
-    """Options of ``extract``: how frames are read.
-
-    Keys:
-        preset, response, side, channels: see ``SequenceOptions``.
-    """
-
-    preset: Annotated[Preset, Usual("balanced")]
-    response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
-    side: Annotated[Side, Usual("designed")]
-    channels: Annotated[Channels, Usual("bgr")]
 
 
 def dataset(

@@ -13,6 +13,7 @@ from cmpdesign.api.layouts import Layout, build_layout
 from cmpdesign.design.design import Design as Parameters
 from cmpdesign.design.design import load_design
 from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.options import Preset
 from cmpdesign.layout.checks import CAMERA_PX
 from cmpdesign.products.building import Built, Checked, build_files, check_products
 from cmpdesign.products.registry import USUAL_NAMES, chosen_products
@@ -77,20 +78,24 @@ class Design(Parameters):
 
         return design_report(self, self.layout)
 
-    def check(self, camera: tuple[int, int] = CAMERA_PX, *, read: bool = False) -> Checked:
+    def check(
+        self, camera: tuple[int, int] = CAMERA_PX, *, read: bool = False, preset: Preset = "balanced"
+    ) -> Checked:
         """The features that cannot be made or read, as in the command ``check``.
 
         Args:
             camera: width and height in px of the camera whose picture the pattern fills.
             read: also draw and read the pads that laser, mold and print would make.
+            preset: see ``SequenceOptions``.
         """
-        return check_products(self, self.layout, checked_camera(camera), read=read)
+        return check_products(self, self.layout, checked_camera(camera), read=read, preset=preset)
 
     def write(
         self,
         folder: str | Path = "out",
         products: str | Iterable[str] = USUAL_NAMES,
         camera: tuple[int, int] = CAMERA_PX,
+        preset: Preset = "balanced",
     ) -> Built:
         """Write the design's files, as the command ``build`` does.
 
@@ -98,14 +103,14 @@ class Design(Parameters):
             folder: folder for the files; made if missing. Files of earlier builds that do not belong to this design
                 are removed, unless they were changed.
             products: products to make: svg, layout, preview, report, laser, mold, mesh, print.
-            camera: see ``check``; pads of lasers, molds and prints are read as this camera sees them.
+            camera, preset: see ``check``; pads of lasers, molds and prints are read as this camera sees them.
 
         Raises:
             CmpDesignError: an unknown product, or a product that cannot be made; no file is written.
             OutputError: a file cannot be written.
         """
-        names = products if isinstance(products, str) else ",".join(products)
-        return build_files(self, self.layout, folder, chosen_products(names), checked_camera(camera))
+        names = chosen_products(products if isinstance(products, str) else ",".join(products))
+        return build_files(self, self.layout, folder, names, checked_camera(camera), preset=preset)
 
     def __repr__(self) -> str:
         given = ", ".join(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.options import Preset, Written
-from cmpdesign.products.registry import USUAL_NAMES, chosen_products
+from cmpdesign.products.registry import USUAL_NAMES
 
 if TYPE_CHECKING:
     from cmpdesign.api.designs import Design
@@ -55,14 +55,10 @@ def build(
         CmpDesignError: an unknown product, or a product that cannot be made; no file is written.
         OutputError: a file cannot be written.
     """
-    from cmpdesign.api.designs import checked_camera
     from cmpdesign.documents.designs import BuildDocument
     from cmpdesign.layout.report import report_values
-    from cmpdesign.products.building import build_files
 
-    names = chosen_products(products if isinstance(products, str) else ",".join(products))
-    chosen, camera_px = _design(design, overrides), checked_camera(camera)
-    built = build_files(chosen, chosen.layout, output, names, camera_px, preset=preset)
+    built = _design(design, overrides).write(output, products, camera, preset)
     return BuildDocument.of(
         built,
         digest=built.report.digest,
@@ -91,12 +87,10 @@ def check(
         design, overrides, camera, preset: see ``build``.
         read: draw and read the pads that laser, mold and print would make.
     """
-    from cmpdesign.api.designs import checked_camera
     from cmpdesign.documents.designs import CheckDocument
-    from cmpdesign.products.building import check_products
 
     chosen = _design(design, overrides)
-    checked = check_products(chosen, chosen.layout, checked_camera(camera), read=read, preset=preset)
+    checked = chosen.check(camera, read=read, preset=preset)
     return CheckDocument.of(
         checked,
         digest=chosen.layout.digest,

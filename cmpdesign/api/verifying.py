@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 from cmpdesign.errors import InputError, parameter
 from cmpdesign.files.atomic import write_file
 from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
-from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written
+from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written, settled
 from cmpdesign.inputs.texts import one_line, visible
 from cmpdesign.watch import notice, tell, told
 
@@ -30,33 +30,35 @@ if TYPE_CHECKING:
     OneImage = str | Path | NDArray[Any]
 
 
-@dataclass(frozen=True, eq=False)
+class VerifyOptions(TypedDict, total=False):
+    """Options of ``verify`` and ``Verifier``.
+
+    Keys:
+        min_share: share of the visible markers that must be measured.
+        sheet_dpi: the pictures are print sheets of this resolution (0: unknown); the files' own resolution is ignored;
+            None: pictures that show the code of a print sheet are judged as such.
+        preset, response, channels, max_pixels: see ``SequenceOptions``.
+    """
+
+    min_share: Annotated[float, Usual(0.9, least=0, most=1)]
+    sheet_dpi: Annotated[float | None, Usual(None, least=0)]
+    preset: Annotated[Preset, Usual("balanced")]
+    response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
+    channels: Annotated[Channels, Usual("bgr")]
+    max_pixels: Annotated[int, Usual(MAX_PIXELS, metavar="COUNT", least=256)]
+
+
 class Verifier:
     """Gives verdicts on pictures of one pattern, or of the pads of a family; the reader is made once.
 
     Attributes:
-        layouts: the layout, or the layouts of a family, see ``extractor.Extractor``.
-        min_share: share of the visible markers that must be measured, 0 to 1.
-        response: relation of light and values, see ``extractor.Extractor``.
-        channels: "bgr" or "rgb", the order of a picture's colors.
-        sheet_dpi: the pictures are print sheets of this resolution, instead of the files' own; 0: unknown; None:
-            pictures that show the code of a print sheet are judged as such.
-        max_pixels: largest picture that is read from a file, width x height.
-        preset: see ``extractor.Extractor``.
+        family: the layouts, see ``extractor.Extractor``.
+        options: all options, see ``VerifyOptions``.
     """
 
-    layouts: Reference | Sequence[Reference]
-    min_share: float = 0.9
-    response: Response | None = None
-    channels: Channels = "bgr"
-    sheet_dpi: float | None = None
-    max_pixels: int = MAX_PIXELS
-    preset: Preset = "balanced"
-
-    @property
-    def family(self) -> Sequence[Reference]:
-        """The layouts."""
-        return self.layouts if isinstance(self.layouts, Sequence) else (self.layouts,)
+    def __init__(self, layouts: Reference | Sequence[Reference], **options: Unpack[VerifyOptions]) -> None:
+        self.family = tuple(layouts) if isinstance(layouts, Sequence) else (layouts,)
+        self.options = settled(VerifyOptions, options)
 
     @property
     def reference(self) -> Reference:
@@ -68,7 +70,7 @@ class Verifier:
         """The reader; made for the first picture."""
         from extractor import Extractor
 
-        return Extractor(self.layouts, self.preset, self.response, "either")
+        return Extractor(self.family, self.options["preset"], self.options["response"], "either")
 
     def read(self, image: str | Path | NDArray[Any]) -> NDArray[Any]:
         """The picture as (H, W, 3) BGR.
@@ -79,10 +81,10 @@ class Verifier:
         from cmpdesign.files.images import read_image, require_color_picture
 
         if isinstance(image, str | Path):
-            pixels: NDArray[Any] = read_image(image, self.max_pixels)
+            pixels: NDArray[Any] = read_image(image, self.options["max_pixels"])
         else:
             pixels = require_color_picture(image)
-        return pixels[:, :, ::-1].copy() if self.channels == "rgb" else pixels
+        return pixels[:, :, ::-1].copy() if self.options["channels"] == "rgb" else pixels
 
     def judge(self, image: NDArray[Any], path: Path | None = None) -> Verdict | SheetVerdict:
         """The verdict on a picture that ``read`` returns; ``path``: the picture's file, which may state the
@@ -91,10 +93,11 @@ class Verifier:
         from cmpdesign.products.sheet.verdict import judge_sheet
         from cmpdesign.reading.verify import verify as judge_pattern
 
-        sheet = judge_sheet(image, path, [one.digest for one in self.family], self.sheet_dpi)
-        if sheet.is_sheet or self.sheet_dpi is not None:
+        dpi = self.options["sheet_dpi"]
+        sheet = judge_sheet(image, path, [one.digest for one in self.family], dpi)
+        if sheet.is_sheet or dpi is not None:
             return sheet
-        return judge_pattern(self.extractor, image, self.min_share)
+        return judge_pattern(self.extractor, image, self.options["min_share"])
 
     def verify(self, image: str | Path | NDArray[Any]) -> Verdict | SheetVerdict:
         """Read and judge a picture: a file, or (H, W, 3) uint8 or uint16.
@@ -103,23 +106,6 @@ class Verifier:
             ImageFileError: a file or an array that is no color picture.
         """
         return self.judge(self.read(image), Path(image) if isinstance(image, str | Path) else None)
-
-
-class VerifyOptions(TypedDict, total=False):
-    """Options of ``verify``: the attributes of ``Verifier``.
-
-    Keys:
-        min_share: share of the visible markers that must be measured.
-        sheet_dpi: the pictures are print sheets of this resolution (0: unknown); the files' own resolution is ignored.
-        preset, response, channels, max_pixels: see ``SequenceOptions``.
-    """
-
-    min_share: Annotated[float, Usual(0.9, least=0, most=1)]
-    sheet_dpi: Annotated[float | None, Usual(None, least=0)]
-    preset: Annotated[Preset, Usual("balanced")]
-    response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
-    channels: Annotated[Channels, Usual("bgr")]
-    max_pixels: Annotated[int, Usual(MAX_PIXELS, metavar="COUNT", least=256)]
 
 
 def verify(
@@ -204,7 +190,7 @@ def _source_images(
     if all(isinstance(image, str | Path | int) for image in images):
         sources = name_sources(map(str, images))
         total = count_images(sources, frames)
-        found = source_images(sources, frames, Reading(max_pixels=judge.max_pixels, bits=bits))
+        found = source_images(sources, frames, Reading(max_pixels=judge.options["max_pixels"], bits=bits))
         yield from found if total is None else told(found, total, "pictures")
         return
     for number, image in enumerate(images, start=1):
@@ -283,7 +269,7 @@ def _document(judge: Verifier, images: Sequence[Mapping[str, Any]], found: objec
         version=1,
         pattern=judge.reference.pattern,
         digest=judge.reference.digest,
-        min_share=judge.min_share,
+        min_share=judge.options["min_share"],
         verified=all(image["verified"] for image in images),
         images=images,
         **({"codes": codes} if len(judge.family) > 1 else {}),
@@ -294,12 +280,7 @@ def _new_report(judge: Verifier, layout_text: str) -> ProblemReport:
     """The bundle of pictures, layout and settings, without a picture."""
     from cmpdesign.reading.problem_report import ProblemReport
 
-    settings = {
-        "preset": judge.preset,
-        "response": None if judge.response is None else str(judge.response),
-        "channels": judge.channels,
-        "min_share": judge.min_share,
-    }
+    settings = {name: judge.options[name] for name in ("preset", "response", "channels", "min_share")}
     return ProblemReport(layout_text, settings)
 
 

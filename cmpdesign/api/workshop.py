@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -47,28 +46,17 @@ def kerf(
     from cmpdesign.documents.reading import GridDocument, KerfDocument
     from cmpdesign.files.images import read_image
     from cmpdesign.products.laser.coupon.design import load_coupon
-    from cmpdesign.products.laser.coupon.photo import read_coupon
-    from cmpdesign.products.laser.coupon.stated_response import stated_response
-    from cmpdesign.products.laser.grid.reading import read_grid
+    from cmpdesign.products.laser.coupon.picture import PhotoError
+    from cmpdesign.products.laser.grid.reading import GridReading, read_cut
 
     cut, image = load_coupon(Path(coupon)), read_image(photo, max_pixels, gray=True)
-    with _naming(photo):
-        if cut.kind == "grid":
-            grid = read_grid(cut, image, response or "srgb")
-            return GridDocument.of(grid, **grid.to_json())
-        found = read_coupon(cut, image, response=response, stated=stated_response(Path(photo)), face=face)
-    return KerfDocument.of(found, **found.to_json(cut))
-
-
-@contextmanager
-def _naming(photo: str | Path) -> Iterator[None]:
-    """Within this context, an error of a picture names the picture."""
-    from cmpdesign.products.laser.coupon.picture import PhotoError
-
     try:
-        yield
+        found = read_cut(cut, Path(photo), image, response, face)
     except PhotoError as error:
         raise CmpDesignError(f"{photo}: {error}") from None
+    if isinstance(found, GridReading):
+        return GridDocument.of(found, **found.to_json())
+    return KerfDocument.of(found, **found.to_json(cut))
 
 
 def evaluate(

@@ -20,14 +20,13 @@ from cmpdesign.cli.commands import (
     making,
     pages,
     pictures,
-    size,
 )
 from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
 from cmpdesign.errors import OutputError
 
 __all__ = ["app", "main"]
 # The modules whose commands stand in no group have added these to ``app``.
-UNGROUPED = (following, kerf, making, pages, pictures, size)
+UNGROUPED = (following, kerf, making, pages, pictures)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(datasets.export, name="export")

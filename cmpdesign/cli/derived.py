@@ -19,12 +19,11 @@ from typing import Annotated, Any, Union, Unpack, get_args, get_origin
 import typer
 
 from cmpdesign.cli.command import Command, examples
-from cmpdesign.cli.options.completions import COMPLETIONS
-from cmpdesign.cli.options.texts import parse_pairs, parse_pixels, parse_reading_response
+from cmpdesign.cli.options import COMPLETIONS, parse_pairs, parse_pixels, parse_response
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish, print_written
 from cmpdesign.inputs.options import Response, Usual, Written, options_of
-from cmpdesign.tracking.jobs.options import SequenceOptions
+from cmpdesign.tracking.jobs.options import ReadingOptions, SequenceOptions
 
 Run = Callable[..., Any]
 Parse = Callable[[Any], Any]
@@ -179,7 +178,7 @@ def _taken(call: Callable[..., Any]) -> Iterator[_Taken]:
 def _meanings(described: Any) -> dict[str, str]:
     """Name -> meaning of every argument or key in a docstring and in the docstrings that it names."""
     found: dict[str, str] = {}
-    of_records = dict(_meanings(SequenceOptions)) if described is not SequenceOptions else {}
+    of_records = {} if described in (SequenceOptions, ReadingOptions) else dict(_meanings(SequenceOptions))
     names = getattr(described, "__globals__", None) or vars(inspect.getmodule(described))
     for entry, text in _ENTRY.findall(inspect.getdoc(described) or ""):
         meaning = " ".join(text.split())
@@ -282,7 +281,7 @@ def _parser(taken: _Taken) -> Parse:
     """From what typer gives to what the call takes."""
     members, option = _members(taken.kind), taken.written.name or f"--{taken.name.replace('_', '-')}"
     if set(members) == set(get_args(Response)):
-        return parse_reading_response
+        return parse_response
     if _is_pixels(taken.kind):
         most = int(taken.written.most or 99_999)
         return lambda text: None if text is None else parse_pixels(option, text, most)

@@ -38,7 +38,7 @@ def print_rows(done: DocumentPart, names: str, **texts: str) -> None:
         meaning = type(done).model_fields[name].description or ""
         if text:
             words = meaning if meaning[1:2].isupper() else meaning[:1].lower() + meaning[1:]
-            rows[_title(name)] = f"{text} ({words.removesuffix('.')})" if words else text
+            rows[_words(name)[0]] = f"{text} ({words.removesuffix('.')})" if words else text
     say_table(rows)
 
 
@@ -52,7 +52,7 @@ def print_parts(parts: Sequence[DocumentPart], names: str = "", *, folds: bool =
     """
     shown = names.split() or list(type(parts[0]).model_fields)
     rows = [[_plain(getattr(part, name)) for name in shown] for part in parts]
-    headings = [f"{_title(name)} {_unit(name)}".strip() for name in shown]
+    headings = [" ".join(filter(None, _words(name))) for name in shown]
     numbers = [all(isinstance(getattr(part, name), int | float | None) for part in parts) for name in shown]
     say_columns(
         [f">{text}" if right else text for text, right in zip(headings, numbers, strict=True)],
@@ -66,7 +66,7 @@ def print_maps(done: DocumentPart, names: str) -> None:
     maps = {name: getattr(done, name) for name in names.split()}
     keys = next(iter(maps.values()))
     rows = [[key, *(f"{each[key]:.6g}" for each in maps.values())] for key in keys]
-    say_columns(["", *(f">{_title(name)}" for name in maps)], rows)
+    say_columns(["", *(f">{_words(name)[0]}" for name in maps)], rows)
 
 
 def _is_part(value: object) -> bool:
@@ -74,28 +74,19 @@ def _is_part(value: object) -> bool:
     return hasattr(type(value), "model_fields")
 
 
-def _title(name: str) -> str:
-    return " ".join(_without_unit(name).split("_"))
-
-
-def _without_unit(name: str) -> str:
-    unit = _suffix(name)
-    return name.removesuffix(unit).rstrip("_")
-
-
-def _suffix(name: str) -> str:
-    """The last words of a name that are a unit; empty without one."""
+def _words(name: str) -> tuple[str, str]:
+    """The title of a field, and its unit; empty without one."""
     words = name.split("_")
-    return next((tail for tail in ("_".join(words[-2:]), words[-1]) if tail in UNITS), "")
-
-
-def _unit(name: str) -> str:
-    return UNITS.get(_suffix(name), "")
+    for count in (2, 1):
+        unit = "_".join(words[-count:])
+        if unit in UNITS:
+            return " ".join(words[:-count]), UNITS[unit]
+    return " ".join(words), ""
 
 
 def _text(name: str, value: Any, unit: str = "") -> str:
     """A value with its unit; parts of the value with their names. Empty: unknown, or nothing."""
-    unit = _unit(name) or unit
+    unit = _words(name)[1] or unit
     if _is_part(value) or isinstance(value, Mapping):
         return ", ".join(_named(value, unit, name.rpartition("_")[2] in SHARES))
     if isinstance(value, list | tuple) and value and _is_part(value[0]):
@@ -111,7 +102,7 @@ def _named(part: DocumentPart | Mapping[str, Any], unit: str, is_share: bool) ->
     for name, value in items:
         text = f"{value:.2%}" if is_share else _text(str(name), value, unit)
         if text:
-            yield f"{_title(str(name))} {text}".strip()
+            yield f"{_words(str(name))[0]} {text}".strip()
 
 
 def _plain(value: Any) -> str:

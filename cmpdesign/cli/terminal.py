@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from cmpdesign.documents.document import Document
 
+EXIT_NEGATIVE = 1  # done, with a negative verdict or an early end
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _STARTED = time.perf_counter()

@@ -9,7 +9,7 @@ from cmpdesign.api import force as forces
 from cmpdesign.cli.command import new_group
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_maps, print_parts, print_rows
-from cmpdesign.cli.terminal import print_warning, say
+from cmpdesign.cli.terminal import EXIT_NEGATIVE, print_warning, say
 
 if TYPE_CHECKING:
     from cmpdesign.documents import calibration as documents
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         CalibratePatternDocument,
     )
 
-EXIT_CHANGED = 1
 LARGEST_RESIDUAL_Z = 2.0
 LARGEST_SCALE = 3.0  # residuals over their stated deviations, as of a rest frame of reconstruct
 LARGEST_MIRROR_SHIFT_MM = 0.2
@@ -67,13 +66,13 @@ def check(done: documents.CalibrateCheckDocument) -> int:
         say("the calibration holds")
         return 0
     print_parts(done.causes, "cause left")
-    likely = [one for one in done.causes if one.likely]
-    print_warning(f"the calibration does not hold; likely cause: {'; or '.join(one.cause for one in likely)}")
-    for one in likely:
-        say(", ".join(f"{name} {value:+.4g}" for name, value in one.changes.items()))
+    print_warning(f"the calibration does not hold; likely cause: {'; or '.join(done.found)}")
+    for one in done.causes:
+        if one.likely:
+            say(", ".join(f"{name} {value:+.4g}" for name, value in one.changes.items()))
     for step in done.steps:
         say(f"do: {step}")
-    return EXIT_CHANGED
+    return EXIT_NEGATIVE
 
 
 @command(

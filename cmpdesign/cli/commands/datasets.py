@@ -8,7 +8,7 @@ from cmpdesign.api import datasets, workshop
 from cmpdesign.cli.command import app, new_group
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_rows
-from cmpdesign.cli.terminal import print_warning
+from cmpdesign.cli.terminal import EXIT_NEGATIVE, print_warning
 
 if TYPE_CHECKING:
     from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
@@ -37,7 +37,7 @@ def dataset(done: DatasetDocument | DatasetCheckDocument) -> int:
     for problem in done.problems:
         print_warning(problem)
     print_rows(done, "folder frames shards of_shards bytes")
-    return 1 if done.problems else 0
+    return EXIT_NEGATIVE if done.problems else 0
 
 
 @command(

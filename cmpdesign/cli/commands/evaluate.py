@@ -10,7 +10,7 @@ import typer
 from cmpdesign.api import workshop
 from cmpdesign.cli.command import Command, examples, new_group
 from cmpdesign.cli.derived import derived
-from cmpdesign.cli.options.completions import COMPLETIONS
+from cmpdesign.cli.options import COMPLETIONS
 from cmpdesign.cli.terminal import say
 from cmpdesign.evaluation.defaults import USUAL_TRIALS
 

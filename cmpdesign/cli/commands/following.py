@@ -11,12 +11,11 @@ from cmpdesign.api import sequences
 from cmpdesign.cli.command import app
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_rows
-from cmpdesign.cli.terminal import EXIT_INTERRUPTED, print_warning, say, say_text
+from cmpdesign.cli.terminal import EXIT_INTERRUPTED, EXIT_NEGATIVE, print_warning, say, say_text
 
 if TYPE_CHECKING:
     from cmpdesign.documents.runs import ReconstructDocument, RecoverDocument, TrackDocument
 
-EXIT_NOT_TRACKED = 1
 RecoverOption = Annotated[
     bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
 ]
@@ -90,7 +89,7 @@ def _recovered(done: RecoverDocument, given: Mapping[str, Any]) -> int:
         say(f"{done.frames} frames recovered")
         return 0
     print_warning(f"{given['output']}: the run ended before its first frame; the unfinished file is removed")
-    return EXIT_NOT_TRACKED
+    return EXIT_NEGATIVE
 
 
 def _exit_code(done: TrackDocument | ReconstructDocument) -> int:
@@ -102,4 +101,4 @@ def _exit_code(done: TrackDocument | ReconstructDocument) -> int:
         say_text(f"{done.times.text}\n")
     if done.ended_early:
         print_warning(f"{done.ended_early}; the frames until then are written")
-    return EXIT_NOT_TRACKED if done.ended_early or not done.frames.tracked else 0
+    return EXIT_NEGATIVE if done.ended_early or not done.frames.tracked else 0

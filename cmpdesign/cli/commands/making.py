@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping
 from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +14,16 @@ from cmpdesign.api import making
 from cmpdesign.cli.command import Command, app, examples
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_parts
-from cmpdesign.cli.terminal import current_mode, print_document, print_warning, say, say_table
+from cmpdesign.cli.terminal import (
+    EXIT_NEGATIVE,
+    current_mode,
+    print_document,
+    print_warning,
+    say,
+    say_table,
+    say_text,
+)
+from cmpdesign.proposal import sizing
 
 if TYPE_CHECKING:
     from cmpdesign.documents.designs import (
@@ -23,8 +33,8 @@ if TYPE_CHECKING:
         TemplateDocument,
         TemplatesDocument,
     )
+    from cmpdesign.proposal.camera_design import Proposal
 
-EXIT_NOT_PASSED = 1
 # The command or option that takes the names of a kind.
 TAKERS = {
     "designs": "for build, check, init --extends and evaluate designs",
@@ -79,6 +89,24 @@ def init(made: InitDocument, given: Mapping[str, Any]) -> None:
 
 @command(
     app,
+    sizing.size,
+    "comparing patterns",
+    "cmpdesign size --camera 1280x960 --view 24x18mm",
+    "cmpdesign size --camera 640x480 --view 20x15mm --make mold -o sized.toml",
+)
+def size(done: Proposal, given: Mapping[str, Any]) -> None:
+    """The design is printed as TOML, or written into a file for build."""
+    say_table(done.figures())
+    output = given["output"]
+    if output is None:
+        say_text(f"\n{done.to_toml()}\n# next: the same with -o sized.toml\n")
+        return
+    say(f"wrote {output}")
+    say_text(f"next: {done.next_command.replace('DESIGN.toml', shlex.quote(str(output)))}\n")
+
+
+@command(
+    app,
     making.build,
     "building",
     "cmpdesign build tac3d -o mine --set pitch_mm=60mil",
@@ -101,7 +129,7 @@ def build(done: BuildDocument) -> int:
     for finding in built.findings:
         verb = "will not work" if finding.severity == "error" else "may not work"
         print_warning(f"{verb}: {finding}")
-    return 0 if built.works else EXIT_NOT_PASSED
+    return 0 if built.works else EXIT_NEGATIVE
 
 
 @command(
@@ -122,7 +150,7 @@ def check(done: CheckDocument) -> int:
         print_parts(done.findings, folds=True)
     else:
         say("no findings: the design can be made and read")
-    return 0 if done.passed else EXIT_NOT_PASSED
+    return 0 if done.passed else EXIT_NEGATIVE
 
 
 def _say_readings(readings: Mapping[str, Any]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cmpdesign.cli.command import Command, app, examples
-from cmpdesign.cli.options.images import SourcesArgument
+from cmpdesign.cli.options import SourcesArgument
 from cmpdesign.cli.terminal import current_mode, finish, print_document, say
 from cmpdesign.errors import CmpDesignError
 

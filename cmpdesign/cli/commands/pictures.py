@@ -12,9 +12,9 @@ import typer
 from cmpdesign.api import pictures, sequences, verifying
 from cmpdesign.cli.command import app
 from cmpdesign.cli.derived import command
-from cmpdesign.cli.options.images import SourcesArgument
+from cmpdesign.cli.options import SourcesArgument
 from cmpdesign.cli.records import print_rows
-from cmpdesign.cli.terminal import EXIT_BAD_INPUT, print_error, print_warning, say, say_text
+from cmpdesign.cli.terminal import EXIT_BAD_INPUT, EXIT_NEGATIVE, print_error, print_warning, say, say_text
 from cmpdesign.inputs.texts import visible
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
         ListedCameraPart,
         RenderDocument,
     )
-
-EXIT_NOT_VERIFIED = 1
 
 
 @command(
@@ -81,7 +79,7 @@ def verify(done: VerifyDocument, given: dict[str, Any]) -> int:
         print_error(error)
     if given["report"] is not None:
         say(f"wrote {given['report']}")
-    return EXIT_BAD_INPUT if errors else 0 if done.verified else EXIT_NOT_VERIFIED
+    return EXIT_BAD_INPUT if errors else 0 if done.verified else EXIT_NEGATIVE
 
 
 @command(app, sequences.cameras, "listing", "cmpdesign cameras", "cmpdesign cameras --json")

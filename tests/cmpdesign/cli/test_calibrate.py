@@ -30,7 +30,11 @@ def test_the_layout_as_made_is_written(folder: Path, tmp_path: Path) -> None:
     )
     assert result.exit_code == 0 and result.stderr == "", result.output
     rows = dict(re.split(r"  +", line, maxsplit=1) for line in result.stdout.splitlines()[1:])
-    assert (rows["pictures"].strip(), rows["side"].strip(), rows["measured"].strip()) == ("10", "front", "127")
+    assert (rows["pictures"].strip(), rows["side"].strip(), rows["measured"].strip()) == (
+        "10",
+        "front",
+        "127",
+    )
     assert result.stdout.startswith(f"wrote {tmp_path / 'made.json'}\n")
     made = load_layout(tmp_path / "made.json")
     np.testing.assert_array_equal(made.xy_mm, learnt().layout.xy_mm)

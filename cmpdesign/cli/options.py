@@ -1,14 +1,51 @@
-"""Values on the command line that are written in a form of their own: sizes, responses, pairs."""
+"""Values on the command line: sources, sizes, pairs, responses, and the names of templates that shells complete."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, cast
+
+import typer
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.options import Response, Written
+
+SourcesArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="SOURCE",
+        help='Pictures, folders, patterns such as "run*/*.png", a video, a camera\'s number, or rtsp://...',
+    ),
+]
+
+
+def _names(finder: str) -> Callable[[str], list[str]]:
+    def complete(incomplete: str) -> list[str]:
+        from cmpdesign.design import templates
+
+        return [name for name in getattr(templates, finder)() if name.startswith(incomplete)]
+
+    return complete
+
+
+def complete_template(incomplete: str) -> list[str]:
+    """The names of all kinds of templates that begin with a text."""
+    from cmpdesign.design.templates import template_kinds
+
+    return [name for names in template_kinds().values() for name in names if name.startswith(incomplete)]
+
+
+# The parameter of a call -> the names that begin with a text.
+COMPLETIONS: Mapping[str, Callable[[str], list[str]]] = {
+    "design": _names("templates"),
+    "designs": _names("templates"),
+    "extends": _names("templates"),
+    "scene": _names("scene_templates"),
+    "plan": _names("plan_templates"),
+    "show": complete_template,
+}
 
 
 def parse_pixels(option: str, text: str, largest: int) -> tuple[int, int]:
@@ -59,31 +96,21 @@ def parse_pairs(option: str, texts: Sequence[str], key: type, written: Written) 
     return pairs
 
 
-def parse_response(text: str) -> Response:
-    """The response from "srgb", "linear" or an exponent.
+def parse_response(text: str | None) -> Response | None:
+    """The response from "srgb", "linear" or an exponent; None where the option is not given.
 
     Raises:
         CmpDesignError: another text, or an exponent beyond its limits.
     """
-    if text == "srgb":
-        return "srgb"
-    if text == "linear":
-        return "linear"
+    if text in (None, "srgb", "linear"):
+        return cast("Response | None", text)
+    from extractor.image.response import light_of_values
+
     try:
         exponent = float(text)
+        light_of_values(exponent)
     except ValueError:
         raise CmpDesignError(
             f"--response {text}: expected srgb, linear or an exponent from 0.2 to 5, as in 2.2"
         ) from None
-    from extractor.image.response import light_of_values
-
-    try:
-        light_of_values(exponent)
-    except ValueError as error:
-        raise CmpDesignError(f"--response {text}: {error}") from None
     return exponent
-
-
-def parse_reading_response(text: str | None) -> Response | None:
-    """As ``parse_response``; None where the option is not given: the response follows from the image's depth."""
-    return None if text is None else parse_response(text)
