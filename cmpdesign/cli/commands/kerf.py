@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from cmpdesign.api import workshop
 from cmpdesign.cli.command import app
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_parts, print_rows
-from cmpdesign.cli.terminal import say
+from cmpdesign.cli.terminal import say, say_columns
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.reading import GridDocument, KerfDocument, PatchPart
+    from cmpdesign.documents.reading import GridDocument, GridFieldPart, KerfDocument, PatchPart
     from cmpdesign.products.laser.grid.reading import FieldReading
 
 
@@ -30,21 +30,32 @@ def kerf(done: KerfDocument | GridDocument, given: Mapping[str, Any]) -> None:
 
     coupon, photo = load_coupon(given["coupon"]), given["photo"].name
     if done.format == "cmp-grid":
-        print_parts(
-            done.fields,
-            "name power_percent speed_mm_s windows passes least_depth_per_pass_mm most_depth_per_pass_mm",
-        )
+        _print_fields(done.fields)
         print_rows(done, "scale_px_mm from_back best")
         if done.best is None:
             say("\nno field cuts through with a pass in reserve: raise the power, or lower the speed")
             return
         lines = list(_settings_lines(done.found.best, photo))
     else:
-        print_parts(done.patches)
+        print_parts(
+            done.patches,
+            "name power_percent speed_mm_s passes kerf_x_mm kerf_x_back_mm kerf_y_mm kerf_y_back_mm",
+        )
         print_rows(done, "scale_px_mm fit_mm response from_back face taper_deg taper_assumed thickness_mm")
         lines = [line for patch in done.patches for line in _kerf_lines(patch, done.face, photo)]
     say(f"\nfor the file of {coupon.material}, the settings of {coupon.machine}:")
     say("\n".join(lines))
+
+
+def _print_fields(fields: Sequence[GridFieldPart]) -> None:
+    """The windows of every field by their passes, and the bounds of the depth of a pass."""
+    counts = [f"{count} x" for count in fields[0].windows]
+    rows = []
+    for one in fields:
+        low, high = one.least_depth_per_pass_mm, one.most_depth_per_pass_mm
+        depth = f"{low:.3g} or more" if high is None else f"{low:.3g} to {high:.3g}"
+        rows.append((one.name, f"{one.power_percent:g}", f"{one.speed_mm_s:g}", *one.windows.values(), depth))
+    say_columns(("name", ">power %", ">speed mm/s", *counts, "depth a pass, mm"), rows)
 
 
 def _settings_lines(one: FieldReading, photo: str) -> Iterator[str]:

@@ -56,7 +56,7 @@ def test_the_command_draws_pictures_videos_and_folders(
     video.release()
     still = MOVING.partition("[sequence]")[0]
     code, said = run(still, "-o", tmp_path / "one.png", "--truth", truth, "--size", "60x50", "--seed", 3)
-    assert code == 0 and "one.png: 60 x 50 px" in said
+    assert code == 0 and "size 60 x 50 px" in said
     assert cv2.imread(str(tmp_path / "one.png")).shape == (50, 60, 3)
     assert load_truth(truth).marker_xy_px.shape == (19, 2)
 
