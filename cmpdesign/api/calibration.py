@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
+from cmpdesign import documents
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
 from cmpdesign.inputs.options import Preset, Response, Side, Written
@@ -17,12 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cmpdesign.calibration.camera import CameraCalibration
-    from cmpdesign.documents.calibration import (
-        CalibrateCameraDocument,
-        CalibrateCheckDocument,
-        CalibrateRigDocument,
-    )
-    from cmpdesign.documents.reading import CalibratePatternDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.sensor.sensor_file import SensorFile
     from extractor import LayoutLike, LearntLayout, Markers, Reference, Rig
@@ -40,7 +35,7 @@ def calibrate_camera(
     preset: Preset = "balanced",
     response: Response | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> CalibrateCameraDocument:
+) -> documents.calibration.CalibrateCameraDocument:
     """Calibrate a camera: focal lengths, principal point, distortion, with covariances. Take pictures at many tilts.
 
     >>> camera = cmpdesign.calibrate_camera("layout.json", "sheet/", "camera.toml")
@@ -63,7 +58,6 @@ def calibrate_camera(
     from cmpdesign.calibration.camera import calibrate_points
     from cmpdesign.calibration.pictures import SheetPictures, read_sheets
     from cmpdesign.calibration.response import likely_response
-    from cmpdesign.documents.calibration import CalibrateCameraDocument
     from extractor import Extractor
 
     require_suffix("output", output, ".toml")
@@ -95,7 +89,7 @@ def calibrate_camera(
         {"picture": name, "points": 0, "rms_px": None, "cause": f"not read: {reason}"}
         for name, reason in found.unread.items()
     ]
-    return CalibrateCameraDocument.of(
+    return documents.calibration.CalibrateCameraDocument.of(
         calibration,
         written=written,
         response=used,
@@ -119,7 +113,7 @@ def calibrate_pattern(
     preset: Preset = "accurate",
     response: Response | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> CalibratePatternDocument:
+) -> documents.reading.CalibratePatternDocument:
     """Measure the places of one pad's markers. Read the pad's pictures with the written layout.
 
     >>> made = cmpdesign.calibrate_pattern("layout.json", "at_rest/", "made.json")
@@ -162,10 +156,8 @@ def calibrate_pattern(
     return _pattern_document(learnt, str(output or ""))
 
 
-def _pattern_document(learnt: LearntLayout, written: str) -> CalibratePatternDocument:
+def _pattern_document(learnt: LearntLayout, written: str) -> documents.reading.CalibratePatternDocument:
     import numpy as np
-
-    from cmpdesign.documents.reading import CalibratePatternDocument
 
     made, worst = learnt.layout.as_made, int(learnt.picture_z.argmax())
     assert made is not None and made.covariance_mm2 is not None
@@ -184,7 +176,7 @@ def _pattern_document(learnt: LearntLayout, written: str) -> CalibratePatternDoc
             f"{present - measured} of {present} markers are measured in no picture and stay at their "
             "nominal places; show the whole pad in some pictures"
         )
-    return CalibratePatternDocument.of(
+    return documents.reading.CalibratePatternDocument.of(
         learnt,
         written=written,
         pictures=len(learnt.picture_z),
@@ -213,7 +205,7 @@ def calibrate_rig(
     step_sigma_mm: Annotated[float, Written(metavar="MM", least=1e-6)] = 0.002,
     side: Side = "designed",
     max_pixels: int = MAX_PIXELS,
-) -> CalibrateRigDocument:
+) -> documents.calibration.CalibrateRigDocument:
     """Calibrate the views, the window and the gel of a sensor. What remains undetermined is stated and named.
 
     >>> found = cmpdesign.calibrate_rig("layout.json", "measured.toml", ["rest.png"], "sensor.toml")
@@ -237,7 +229,6 @@ def calibrate_rig(
 
     from cmpdesign.api.layouts import reference_from
     from cmpdesign.calibration.rig.calibration import calibrate_rig_markers
-    from cmpdesign.documents.calibration import CalibrateRigDocument
     from cmpdesign.sensor.sensor_file import load_sensor_file
 
     ways = dict(steps or {})
@@ -267,7 +258,7 @@ def calibrate_rig(
         dated = [name for whole in names[: len(given)] for name in whole.split(",")]
         text = calibrated_text(sensor, calibration, reference, len(given), tuple(ways), _date_of(dated))
         write_file(Path(output), text)
-    return CalibrateRigDocument.of(
+    return documents.calibration.CalibrateRigDocument.of(
         calibration,
         written=str(output or ""),
         pictures=len(given),
@@ -282,7 +273,7 @@ def calibrate_check(
     *,
     layout: LayoutLike | AnyLayout | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> CalibrateCheckDocument:
+) -> documents.calibration.CalibrateCheckDocument:
     """Check a sensor's calibration by its pad at rest. If it does not hold, the cause and the step to repeat are named.
 
     >>> found = cmpdesign.calibrate_check("sensor.toml", ["today.png"])

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypedDict, Unpack
 
+from cmpdesign import documents
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import require_suffix
 from cmpdesign.inputs.options import Response, Usual, Written, settled
@@ -15,7 +16,6 @@ from cmpdesign.inputs.options import Response, Usual, Written, settled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.documents.runs import RenderDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.scene import Scene
     from cmpdesign.scene.files.scene_file import SceneFile
@@ -131,7 +131,7 @@ def render(
     size: Annotated[tuple[int, int] | None, Written(metavar="WxH", most=9999)] = None,
     seed: Annotated[int | None, Written(least=0)] = None,
     **view: Unpack[ViewOptions],
-) -> RenderDocument:
+) -> documents.runs.RenderDocument:
     """Render a pattern as a camera sees the pattern. The picture is seeded, and exact to a thousandth of a pixel.
 
     >>> rendered = cmpdesign.render(layout, pitch_px=22, rotation_deg=12, tilt_deg=15, noise=2, seed=1)
@@ -184,11 +184,10 @@ def _render_picture(
     output: str | Path | None,
     truth: str | Path | None,
     file: SceneFile | None = None,
-) -> RenderDocument:
+) -> documents.runs.RenderDocument:
     """Draw a scene, which may be that of a file."""
     import numpy as np
 
-    from cmpdesign.documents.runs import RenderDocument
     from cmpdesign.files.images import require_image_kind
     from cmpdesign.scene import render as draw
     from cmpdesign.scene import save_truth
@@ -205,7 +204,9 @@ def _render_picture(
         save_truth(rendered.truth, truth)
     visible = np.atleast_2d(rendered.truth.visible).sum(axis=1).tolist()
     written = [str(path) for path in (truth, output) if path is not None]
-    return RenderDocument.of(rendered, written=written, size_px=size_px, frames=1, fps=None, visible=visible)
+    return documents.runs.RenderDocument.of(
+        rendered, written=written, size_px=size_px, frames=1, fps=None, visible=visible
+    )
 
 
 class RenderedSequence(NamedTuple):
@@ -214,15 +215,16 @@ class RenderedSequence(NamedTuple):
     warnings: tuple[str, ...]
 
 
-def _render_sequence(file: SceneFile, output: Path, truth: str | Path | None) -> RenderDocument:
-    from cmpdesign.documents.runs import RenderDocument
+def _render_sequence(
+    file: SceneFile, output: Path, truth: str | Path | None
+) -> documents.runs.RenderDocument:
     from cmpdesign.scene.files.sequence import write_sequence
 
     kinds: dict[str, str] = {}  # by letters, without numbers: the first frame of each kind
     for text, frame in write_sequence(file, output, None if truth is None else Path(truth)).items():
         kind = "".join(letter for letter in text if letter.isalpha())
         kinds.setdefault(kind, f"from frame {frame} ({file.time_s(frame):.3g} s) on: {text}")
-    return RenderDocument.of(
+    return documents.runs.RenderDocument.of(
         RenderedSequence(tuple(kinds.values())),
         written=[str(path) for path in (truth, output) if path is not None],
         size_px=file.size_px,

@@ -7,15 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
+from cmpdesign import documents
 from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.inputs.options import Written, settled
 from cmpdesign.tracking.jobs.options import ShapeOptions, TrackOptions
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.runs import CamerasDocument, ReconstructDocument, RecoverDocument, TrackDocument
     from cmpdesign.inputs.cameras import CameraSettings
     from cmpdesign.layout.layout import Layout as AnyLayout
-    from cmpdesign.tracking.export.runs import Run
     from cmpdesign.tracking.jobs.job import ReconstructJob, TrackJob
     from cmpdesign.tracking.sources import FrameSource
     from extractor import LayoutLike
@@ -30,7 +29,7 @@ def track(
     *,
     on_frame: Callable[[Any], None] = lambda frame: None,
     **options: Unpack[TrackOptions],
-) -> TrackDocument:
+) -> documents.runs.TrackDocument:
     """Follow a pattern through a video, a folder or a camera into a table, as the command ``track`` does.
 
     >>> summary = cmpdesign.track("layout.json", "press.mp4", "run.npz", rest=0)
@@ -65,7 +64,7 @@ def reconstruct(
     *,
     on_frame: Callable[[Any], None] = lambda frame: None,
     **options: Unpack[ShapeOptions],
-) -> ReconstructDocument:
+) -> documents.runs.ReconstructDocument:
     """Reconstruct the surface in space from two or more views, as the command ``reconstruct`` does.
 
     >>> cmpdesign.reconstruct("layout.json", "rig.toml", "rest.png", "press.mp4", "run.npz")
@@ -92,7 +91,7 @@ def reconstruct(
 
 def recover_run(
     layout: LayoutLike | AnyLayout, output: str | Path, of: Literal["track", "reconstruct"] = "track"
-) -> RecoverDocument:
+) -> documents.runs.RecoverDocument:
     """Complete the table or recording of a run that was killed, as the commands' ``--recover`` does.
 
     Args:
@@ -105,7 +104,6 @@ def recover_run(
         OutputError: the file cannot be written.
     """
     from cmpdesign.api.layouts import reference_from
-    from cmpdesign.documents.runs import RecoverDocument
     from cmpdesign.tracking.sinks.tables import recover_table
 
     pattern = reference_from(layout)
@@ -113,7 +111,7 @@ def recover_run(
     if of == "reconstruct":
         rows += len(pattern.edges) * pattern.virtual_per_edge
     found = recover_table(Path(output), rows)
-    return RecoverDocument(
+    return documents.runs.RecoverDocument(
         written=str(output) if found.frames else None, frames=found.frames, problems=tuple(found.problems)
     )
 
@@ -183,7 +181,7 @@ def open_source(
     return sources.open_source(_texts(source), how)
 
 
-def cameras() -> CamerasDocument:
+def cameras() -> documents.runs.CamerasDocument:
     """List the cameras: formats, sizes and rates, and the ranges of exposure, gain, white balance and focus.
 
     >>> [camera.name for camera in cmpdesign.cameras().cameras]
@@ -193,24 +191,12 @@ def cameras() -> CamerasDocument:
     """
     from dataclasses import asdict
 
-    from cmpdesign.documents.runs import CamerasDocument, ListedCameraPart
     from cmpdesign.inputs.cameras import list_cameras
 
     found = [asdict(camera) for camera in list_cameras()]
-    return CamerasDocument(
-        cameras=tuple(ListedCameraPart(**(camera.pop("offer") | camera)) for camera in found)
+    return documents.runs.CamerasDocument(
+        cameras=tuple(documents.runs.ListedCameraPart(**(camera.pop("offer") | camera)) for camera in found)
     )
-
-
-def load_run(path: str | Path) -> Run:
-    """Read an .npz file of ``track`` or ``reconstruct``.
-
-    Raises:
-        CmpDesignError: the file cannot be read, is no file of these commands, or holds no frame.
-    """
-    from cmpdesign.tracking.export.runs import read_run
-
-    return read_run(Path(path))
 
 
 def _texts(source: AnySource) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
+from cmpdesign import documents
 from cmpdesign.errors import InputError, parameter
 from cmpdesign.files.atomic import write_file
 from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
@@ -19,7 +20,6 @@ from cmpdesign.watch import notice, tell, told
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.documents.reading import VerifyDocument
     from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.products.sheet.verdict import SheetVerdict
     from cmpdesign.reading.problem_report import ProblemReport
@@ -119,7 +119,7 @@ def verify(
     bits: Annotated[int | None, Written(least=8, most=16)] = None,
     on_verdict: Callable[[str, Verdict | SheetVerdict], None] = lambda name, verdict: None,
     **options: Unpack[VerifyOptions],
-) -> VerifyDocument:
+) -> documents.reading.VerifyDocument:
     """Extract a picture and check the numbering, the colors, the share of measured markers and the side.
 
     >>> verdict = cmpdesign.verify("out/layout.json", "out/sample.png")
@@ -251,7 +251,7 @@ class _Files:
         if self.bundle is not None:
             self.bundle.add(*source.picture(), verdict.to_json(), stages)
 
-    def finish(self, document: VerifyDocument) -> None:
+    def finish(self, document: documents.reading.VerifyDocument) -> None:
         """Write verify.json and the report."""
         if self.output is not None:
             write_file(self.output / "verify.json", document.to_json())
@@ -259,11 +259,12 @@ class _Files:
             self.bundle.write(self.report)
 
 
-def _document(judge: Verifier, images: Sequence[Mapping[str, Any]], found: object) -> VerifyDocument:
-    from cmpdesign.documents.reading import VerifyDocument
+def _document(
+    judge: Verifier, images: Sequence[Mapping[str, Any]], found: object
+) -> documents.reading.VerifyDocument:
 
     codes = [one.code.id for one in judge.family if one.code is not None]
-    return VerifyDocument.of(
+    return documents.reading.VerifyDocument.of(
         found,
         format="cmp-verification",
         version=1,

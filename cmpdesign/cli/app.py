@@ -16,7 +16,6 @@ from cmpdesign.cli.commands import (
     datasets,
     evaluate,
     following,
-    kerf,
     making,
     pages,
     pictures,
@@ -26,7 +25,7 @@ from cmpdesign.errors import OutputError
 
 __all__ = ["app", "main"]
 # The modules whose commands stand in no group have added these to ``app``.
-UNGROUPED = (following, kerf, making, pages, pictures)
+UNGROUPED = (following, making, pages, pictures)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(datasets.export, name="export")

@@ -99,7 +99,7 @@ def derived(
             for each in own.values()
             if each.kind is each.KEYWORD_ONLY
         ]
-        parsers = {each.name: _parser(each) for each in taken}
+        parsers = {each.name: _form(each)[1] for each in taken}
         keys = {each.name for each in taken if each.is_key}
         takes_given = "given" in inspect.signature(run).parameters
 
@@ -210,7 +210,7 @@ def _help(text: str) -> str:
 
 def _parameter(taken: _Taken, meanings: Mapping[str, str]) -> inspect.Parameter:
     """The parameter as typer reads it."""
-    name, written, kind = taken.name, taken.written, _written_type(taken)
+    name, written, kind = taken.name, taken.written, _form(taken)[0]
     meaning = meanings[name].partition("; None: ")[0] if written.needed else meanings[name]
     words: dict[str, Any] = {"help": _help(meaning), "metavar": written.metavar}
     words["autocompletion"] = COMPLETIONS.get(name)
@@ -244,51 +244,34 @@ def _is_union(kind: Any) -> bool:
     return get_origin(kind) in (Union, UnionType)
 
 
-def _is_pixels(kind: Any) -> bool:
-    """Whether values are sizes that the call does not take as texts."""
-    return str not in _members(kind) and any(get_origin(each) is tuple for each in _members(kind))
-
-
-def _written_type(taken: _Taken) -> Any:
-    """The type that the command line parses: texts for responses, and for what may be a number or a path."""
-    members = _members(taken.kind)
-    is_absent = taken.default is None
-    if taken.written.with_commas:
-        return str
-    several = [each for each in members if get_origin(each) in (Sequence, list) or _is_mapping(each)]
+def _form(taken: _Taken) -> tuple[Any, Parse]:
+    """The type that the command line parses, and the way from its value to what the call takes."""
+    members, written = _members(taken.kind), taken.written
+    option = written.name or f"--{taken.name.replace('_', '-')}"
+    several = [each for each in members if get_origin(each) in (Sequence, list, Mapping)]
+    sizes = [each for each in members if get_origin(each) is tuple]
+    if written.with_commas:
+        return str, _same
+    if several and get_origin(several[0]) is Mapping:
+        key = get_args(several[0])[0]
+        return list[str], lambda texts: parse_pairs(option, texts or [], key, written)
     if several:
         # one or several sources are texts, as patterns and numbers of cameras; a list of files are paths
-        is_of_files = (
-            len(members) == 1 and not _is_mapping(several[0]) and Path in _members(get_args(several[0])[0])
-        )
-        return list[Path] if is_of_files else list[str]
-    is_text = str in members and any(each in (int, float) or get_origin(each) is tuple for each in members)
-    if set(members) == set(get_args(Response)) or _is_pixels(taken.kind) or is_text:
-        kind: Any = str
+        is_of_files = len(members) == 1 and Path in _members(get_args(several[0])[0])
+        return list[Path] if is_of_files else list[str], lambda values: values or taken.default
+    kind: Any = members[0]
+    parse: Parse = _same
+    if set(members) == set(get_args(Response)):
+        kind, parse = str, parse_response
+    elif str in members and (sizes or {int, float} & set(members)):
+        kind = str
+    elif sizes:
+        most = int(written.most or 99_999)
+        kind, parse = str, lambda text: None if text is None else parse_pixels(option, text, most)
     elif Path in members or _PythonOnly in members:
         kind = Path
-    else:
-        assert len(members) == 1, taken
-        (kind,) = members
-    return Union[kind, None] if is_absent else kind  # noqa: UP007
+    return Union[kind, None] if taken.default is None else kind, parse  # noqa: UP007
 
 
-def _is_mapping(kind: Any) -> bool:
-    return get_origin(kind) is Mapping
-
-
-def _parser(taken: _Taken) -> Parse:
-    """From what typer gives to what the call takes."""
-    members, option = _members(taken.kind), taken.written.name or f"--{taken.name.replace('_', '-')}"
-    if set(members) == set(get_args(Response)):
-        return parse_response
-    if _is_pixels(taken.kind):
-        most = int(taken.written.most or 99_999)
-        return lambda text: None if text is None else parse_pixels(option, text, most)
-    for each in members:
-        if _is_mapping(each):
-            key = get_args(each)[0]
-            return lambda texts: parse_pairs(option, texts or [], key, taken.written)
-    if get_origin(members[0]) is Sequence and taken.default == ():
-        return lambda values: values or ()
-    return lambda value: value
+def _same(value: Any) -> Any:
+    return value

@@ -21,30 +21,26 @@ SourcesArgument = Annotated[
 ]
 
 
-def _names(finder: str) -> Callable[[str], list[str]]:
-    def complete(incomplete: str) -> list[str]:
-        from cmpdesign.design import templates
+def _names(*kinds: str) -> Callable[[str], list[str]]:
+    """Completes the names of templates of some kinds; without a kind those of all."""
 
-        return [name for name in getattr(templates, finder)() if name.startswith(incomplete)]
+    def complete(incomplete: str) -> list[str]:
+        from cmpdesign.design.templates import template_kinds
+
+        every = template_kinds()
+        return [name for kind in kinds or every for name in every[kind] if name.startswith(incomplete)]
 
     return complete
 
 
-def complete_template(incomplete: str) -> list[str]:
-    """The names of all kinds of templates that begin with a text."""
-    from cmpdesign.design.templates import template_kinds
-
-    return [name for names in template_kinds().values() for name in names if name.startswith(incomplete)]
-
-
 # The parameter of a call -> the names that begin with a text.
 COMPLETIONS: Mapping[str, Callable[[str], list[str]]] = {
-    "design": _names("templates"),
-    "designs": _names("templates"),
-    "extends": _names("templates"),
-    "scene": _names("scene_templates"),
-    "plan": _names("plan_templates"),
-    "show": complete_template,
+    "design": _names("designs"),
+    "designs": _names("designs"),
+    "extends": _names("designs"),
+    "scene": _names("scenes"),
+    "plan": _names("plans"),
+    "show": _names(),
 }
 
 

@@ -64,9 +64,17 @@ def print_parts(parts: Sequence[DocumentPart], names: str = "", *, folds: bool =
 def print_maps(done: DocumentPart, names: str) -> None:
     """Print maps from the same names to numbers as a table, a column for each map."""
     maps = {name: getattr(done, name) for name in names.split()}
-    keys = next(iter(maps.values()))
-    rows = [[key, *(f"{each[key]:.6g}" for each in maps.values())] for key in keys]
-    say_columns(["", *(f">{_words(name)[0]}" for name in maps)], rows)
+    print_table({key: {name: maps[name].get(key) for name in maps} for key in next(iter(maps.values()))})
+
+
+def print_table(rows: Mapping[str, Mapping[str, float | None]]) -> None:
+    """Print rows of numbers, a column for each name; empty: unknown."""
+    headings = [" ".join(filter(None, _words(name))) for name in next(iter(rows.values()))]
+    texts = [["" if one is None else f"{one:.6g}" for one in row.values()] for row in rows.values()]
+    say_columns(
+        ["", *(f">{text}" for text in headings)],
+        [[name, *row] for name, row in zip(rows, texts, strict=True)],
+    )
 
 
 def _is_part(value: object) -> bool:

@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from cmpdesign.api import calibration
-from cmpdesign.api import force as forces
+from cmpdesign import documents
+from cmpdesign.api import calibration, workshop
 from cmpdesign.cli.command import new_group
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_maps, print_parts, print_rows
 from cmpdesign.cli.terminal import EXIT_NEGATIVE, print_warning, say
-
-if TYPE_CHECKING:
-    from cmpdesign.documents import calibration as documents
-    from cmpdesign.documents.reading import (
-        CalibrateForceDocument,
-        CalibrateGelDocument,
-        CalibratePatternDocument,
-    )
 
 LARGEST_RESIDUAL_Z = 2.0
 LARGEST_SCALE = 3.0  # residuals over their stated deviations, as of a rest frame of reconstruct
@@ -35,7 +25,7 @@ app = new_group("Measure the properties of one sensor from its pictures.", CAMER
     CAMERA,
     'cmpdesign calibrate camera layout.json "sheet/*.png" -o camera.toml --json',
 )
-def camera(done: documents.CalibrateCameraDocument) -> None:
+def camera(done: documents.calibration.CalibrateCameraDocument) -> None:
     """A picture that does not agree with the others is left out, with a reason."""
     print_maps(done, "parameters deviations")
     print_rows(
@@ -59,7 +49,7 @@ def camera(done: documents.CalibrateCameraDocument) -> None:
     "cmpdesign calibrate check index.toml pad.png --json",
     layout=None,
 )
-def check(done: documents.CalibrateCheckDocument) -> int:
+def check(done: documents.calibration.CalibrateCheckDocument) -> int:
     """Exit code 1: the calibration does not hold."""
     print_rows(done, "rms_px stated_px misfit picture_misfits limit_px depth_error")
     if done.holds:
@@ -77,12 +67,12 @@ def check(done: documents.CalibrateCheckDocument) -> int:
 
 @command(
     app,
-    forces.calibrate_force,
+    workshop.calibrate_force,
     "reading the run",
     "cmpdesign calibrate force run.npz weights.csv",
     "cmpdesign calibrate force run.npz weights.csv --json",
 )
-def force(done: CalibrateForceDocument) -> None:
+def force(done: documents.reading.CalibrateForceDocument) -> None:
     """Thickness and marker depth are not fitted: an error of them is part of the modulus."""
     say(f"young_mpa = {done.young_mpa:.4g}\nyoung_sigma_mpa = {done.young_sigma_mpa:.2g}")
     print_rows(done, "bias_n bias_sigma_n weights residual_z")
@@ -95,12 +85,12 @@ def force(done: CalibrateForceDocument) -> None:
 
 @command(
     app,
-    forces.calibrate_gel,
+    workshop.calibrate_gel,
     "solving the block",
     "cmpdesign calibrate gel layout.json sensor.toml -o gel.npz",
     "cmpdesign calibrate gel layout.json sensor.toml -o gel.npz --margin-mm 2",
 )
-def gel(done: CalibrateGelDocument) -> None:
+def gel(done: documents.reading.CalibrateGelDocument) -> None:
     """The file depends on thickness, Poisson's ratio and marker depth, not on Young's modulus."""
     print_rows(done, "loads markers thickness_mm poisson marker_depth_mm margin_mm")
 
@@ -112,7 +102,7 @@ def gel(done: CalibrateGelDocument) -> None:
     PATTERN,
     'cmpdesign calibrate pattern layout.json "rest/*.png" -o made.json --json',
 )
-def pattern(done: CalibratePatternDocument) -> None:
+def pattern(done: documents.reading.CalibratePatternDocument) -> None:
     """Position, turn, size, shear and perspective of the whole pad are not determined."""
     print_rows(
         done,
@@ -128,7 +118,7 @@ def pattern(done: CalibratePatternDocument) -> None:
     "cmpdesign calibrate rig layout.json measured.toml pad.png -o thumb.toml",
     "cmpdesign calibrate rig layout.json measured.toml pad.png -o thumb.toml --json",
 )
-def rig(done: documents.CalibrateRigDocument) -> None:
+def rig(done: documents.calibration.CalibrateRigDocument) -> None:
     """The written file holds all of RIG, and is a RIG itself: its deviations reach all displacements of reconstruct."""
     print_maps(done, "parameters stated deviations")
     print_rows(done, "rms_px scale depth_share held mirrors")

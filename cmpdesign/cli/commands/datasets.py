@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from cmpdesign import documents
 from cmpdesign.api import datasets, workshop
 from cmpdesign.cli.command import app, new_group
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_rows
 from cmpdesign.cli.terminal import EXIT_NEGATIVE, print_warning
-
-if TYPE_CHECKING:
-    from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
-    from cmpdesign.documents.runs import ExportDocument
 
 LEROBOT = "cmpdesign export lerobot run1.npz run2.npz -o dataset"
 ZARR = "cmpdesign export zarr run1.npz run2.npz -o buffer.zarr"
@@ -27,7 +22,7 @@ export = new_group("Export runs as data sets for the training of policies.", LER
     "cmpdesign dataset published --check",
     plan="a TOML file, or the name of a plan template; with --check the folder of a data set",
 )
-def dataset(done: DatasetDocument | DatasetCheckDocument) -> int:
+def dataset(done: documents.data.DatasetDocument | documents.data.DatasetCheckDocument) -> int:
     """A finished shard is not made again: the same command continues an interrupted run. The same plan gives the same
     bytes on any number of workers.
     """
@@ -47,7 +42,7 @@ def dataset(done: DatasetDocument | DatasetCheckDocument) -> int:
     "cmpdesign extract layout.json press.mp4 -o markers",
     "cmpdesign extract layout.json press.mp4 frames -o markers --frames-a-shard 100 --workers 1 --json",
 )
-def extract(done: DatasetDocument) -> None:
+def extract(done: documents.data.DatasetDocument) -> None:
     """A finished shard is not made again: the same command continues an interrupted run."""
     print_rows(done, "frames shards of_shards redrawn bytes")
 
@@ -59,7 +54,7 @@ def extract(done: DatasetDocument) -> None:
     LEROBOT,
     'cmpdesign export lerobot run1.npz -o dataset --task "press" --images frames',
 )
-def lerobot(done: ExportDocument) -> None:
+def lerobot(done: documents.runs.ExportDocument) -> None:
     """observation.tactile.time_s holds the times of the runs."""
     zarr(done)
 
@@ -71,7 +66,7 @@ def lerobot(done: ExportDocument) -> None:
     ZARR,
     "cmpdesign export zarr run1.npz -o buffer.zarr --images frames",
 )
-def zarr(done: ExportDocument) -> None:
+def zarr(done: documents.runs.ExportDocument) -> None:
     """The columns of the frames are data/tactile_*."""
     for warning in done.found:
         print_warning(warning)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
 
 import typer
 
+from cmpdesign import documents
 from cmpdesign.api import workshop
 from cmpdesign.cli.command import Command, examples, new_group
 from cmpdesign.cli.derived import derived
 from cmpdesign.cli.options import COMPLETIONS
-from cmpdesign.cli.terminal import say
+from cmpdesign.cli.records import print_table
 from cmpdesign.evaluation.defaults import USUAL_TRIALS
 
-if TYPE_CHECKING:
-    from cmpdesign.documents.runs import EvaluateDocument
-
 Report = Mapping[str, Any]
+Table = Mapping[str, Mapping[str, float | None]]
 DESIGNS = "cmpdesign evaluate designs tac3d digit -o compared"
 QUICK = "cmpdesign evaluate precision -o quick --trials 1"
 app = new_group(
@@ -32,14 +31,14 @@ DesignsArgument = Annotated[
 ]
 
 
-def _compared(*, design: DesignsArgument, **options: Any) -> EvaluateDocument:
+def _compared(*, design: DesignsArgument, **options: Any) -> documents.runs.EvaluateDocument:
     return workshop.evaluate("designs", designs=design, **options)
 
 
 def experiment(
     *shown: str, trials: str | None = None, calling: Callable[..., Any] | None = None
-) -> Callable[[Callable[[Report], Iterator[str]]], None]:
-    """Add the command of an experiment; its function gives the lines of its report, and its docstring is the help.
+) -> Callable[[Callable[[Report], Table]], None]:
+    """Add the command of an experiment; its function gives a table of its report, and its docstring is the help.
 
     Args:
         shown: examples.
@@ -48,19 +47,18 @@ def experiment(
     """
     left_out = ("experiment", "designs", *(("trials", "seed", "sensor", "preset") if trials is None else ()))
 
-    def decorated(lines: Callable[[Report], Iterator[str]]) -> None:
-        name = lines.__name__
+    def decorated(table: Callable[[Report], Table]) -> None:
+        name = table.__name__
 
-        def call(**options: Any) -> EvaluateDocument:
+        def call(**options: Any) -> documents.runs.EvaluateDocument:
             return workshop.evaluate(name, **options)  # type: ignore[arg-type]
 
-        def run(done: EvaluateDocument) -> None:
-            for line in lines(done.report):
-                say(line)
+        def run(done: documents.runs.EvaluateDocument) -> None:
+            print_table(table(done.report))
 
         words = {} if trials is None else {"trials": f"{trials}; None: {USUAL_TRIALS[name]}"}
         ready = derived(workshop.evaluate, name, calling or call, **dict.fromkeys(left_out), **words)(run)
-        ready.__doc__ = lines.__doc__
+        ready.__doc__ = table.__doc__
         app.command(name, cls=Command, epilog=examples(*shown))(ready)
 
     return decorated
@@ -71,10 +69,9 @@ def experiment(
     QUICK,
     trials="places for every object and cube",
 )
-def precision(report: Report) -> Iterator[str]:
+def precision(report: Report) -> Table:
     """Measure the error on five pressed objects, and the edge fitting error of a cube."""
-    for mode, one in report["edge_fit_error_mm"].items():
-        yield f"edge fitting error, {mode}: {_compared_text(one, ' mm')}"
+    return {f"edge fitting error in mm, {mode}": one for mode, one in report["edge_fit_error_mm"].items()}
 
 
 @experiment(
@@ -82,10 +79,9 @@ def precision(report: Report) -> Iterator[str]:
     "cmpdesign evaluate response -o quick --trials 1 --workers 1",
     trials="places of the cube",
 )
-def response(report: Report) -> Iterator[str]:
+def response(report: Report) -> Table:
     """Measure the share of a shear that the markers under a cube show."""
-    for case, one in report["response"].items():
-        yield f"response, {case}: {_compared_text(one)}"
+    return {f"response, {case}": one for case, one in report["response"].items()}
 
 
 @experiment(
@@ -93,24 +89,29 @@ def response(report: Report) -> Iterator[str]:
     "cmpdesign evaluate reliability -o quick --trials 1 --seed 7",
     trials="places and lights for every mode",
 )
-def reliability(report: Report) -> Iterator[str]:
+def reliability(report: Report) -> Table:
     """Count how often both patterns are read under a ball that presses, then twists or shears."""
-    for mode, methods in report["modes"].items():
-        counts = ", ".join(f"{name} {one['successful']}" for name, one in methods.items())
-        yield f"{mode}, of {report['trials']}: {counts}"
+    return {
+        f"{mode}, of {report['trials']}": {name: one["successful"] for name, one in methods.items()}
+        for mode, methods in report["modes"].items()
+    }
 
 
 @experiment(
     "cmpdesign evaluate angles -o angles",
     "cmpdesign evaluate angles -o angles --workers 2 --json",
 )
-def angles(report: Report) -> Iterator[str]:
+def angles(report: Report) -> Table:
     """Measure how far a single cell can deform or turn before the cell is lost, against eqs. 1 and 2."""
+    rows = {}
     for name, one in report["cells"].items():
         for what, limit in one.items():
             largest = list(limit["measured"])[-1]
-            lost = _number(limit["measured"][largest], ".1f")
-            yield f"{name}, {what}: formula {limit['formula']:.1f}, first lost {lost} at {largest}"
+            rows[f"{name}, {what}, {largest}"] = {
+                "formula": limit["formula"],
+                "first_lost": limit["measured"][largest],
+            }
+    return rows
 
 
 @experiment(
@@ -119,23 +120,14 @@ def angles(report: Report) -> Iterator[str]:
     trials="places and lights for every contact",
     calling=_compared,
 )
-def designs(report: Report) -> Iterator[str]:
+def designs(report: Report) -> Table:
     """Compare designs on one sensor: error, share measured, smallest feature, laser time."""
-    for name, one in report["designs"].items():
-        error = one["surface_rms_mm"]["mean"]
-        shown = "nothing read" if error is None else f"surface {1000 * error:.1f} um RMS"
-        yield (
-            f"{name}: {shown}, {100 * one['measured']['mean']:.1f} % measured, smallest feature "
-            f"{one['smallest_feature_mm']:.3f} mm, laser {_number(one['laser_time_s'], '.0f')} s"
-        )
-
-
-def _compared_text(one: Report, unit: str = "") -> str:
-    """The figures of both patterns, and the change beside the article's."""
-    change, article = (_number(one[name], "+.1f") for name in ("change_percent", "article_change_percent"))
-    square, multicolor = (f"{_number(one[name], '.3f')}{unit}" for name in ("square", "multicolor"))
-    return f"square {square}, multicolor {multicolor} ({change} %; the article {article} %)"
-
-
-def _number(value: float | None, form: str) -> str:
-    return "none" if value is None else f"{value:{form}}"
+    return {
+        name: {
+            "surface_rms_mm": one["surface_rms_mm"]["mean"],
+            "measured_share": one["measured"]["mean"],
+            "smallest_feature_mm": one["smallest_feature_mm"],
+            "laser_time_s": one["laser_time_s"],
+        }
+        for name, one in report["designs"].items()
+    }

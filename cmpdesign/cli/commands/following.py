@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
+from cmpdesign import documents
 from cmpdesign.api import sequences
 from cmpdesign.cli.command import app
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.records import print_rows
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, EXIT_NEGATIVE, print_warning, say, say_text
-
-if TYPE_CHECKING:
-    from cmpdesign.documents.runs import ReconstructDocument, RecoverDocument, TrackDocument
 
 RecoverOption = Annotated[
     bool, typer.Option("--recover", help="Only complete the FILE of a run that was killed.")
@@ -44,7 +42,9 @@ def _followed(call: Callable[..., Any], of: Literal["track", "reconstruct"]) -> 
     calling=_followed(sequences.track, "track"),
     on_frame=None,
 )
-def track(done: TrackDocument | RecoverDocument, given: Mapping[str, Any]) -> int:
+def track(
+    done: documents.runs.TrackDocument | documents.runs.RecoverDocument, given: Mapping[str, Any]
+) -> int:
     """Exit code: 0 done, 1 ended early or nothing tracked, 2 bad input or full disk."""
     if done.format == "cmp-recovery":
         return _recovered(done, given)
@@ -70,7 +70,9 @@ def track(done: TrackDocument | RecoverDocument, given: Mapping[str, Any]) -> in
     calling=_followed(sequences.reconstruct, "reconstruct"),
     on_frame=None,
 )
-def reconstruct(done: ReconstructDocument | RecoverDocument, given: Mapping[str, Any]) -> int:
+def reconstruct(
+    done: documents.runs.ReconstructDocument | documents.runs.RecoverDocument, given: Mapping[str, Any]
+) -> int:
     """Positions, displacements and normals in mm. Exit code: 0 done, 1 ended early or nothing found, 2 bad input."""
     if done.format == "cmp-recovery":
         return _recovered(done, given)
@@ -82,7 +84,7 @@ def reconstruct(done: ReconstructDocument | RecoverDocument, given: Mapping[str,
     return _exit_code(done)
 
 
-def _recovered(done: RecoverDocument, given: Mapping[str, Any]) -> int:
+def _recovered(done: documents.runs.RecoverDocument, given: Mapping[str, Any]) -> int:
     for problem in done.problems:
         print_warning(problem)
     if done.frames:
@@ -92,7 +94,7 @@ def _recovered(done: RecoverDocument, given: Mapping[str, Any]) -> int:
     return EXIT_NEGATIVE
 
 
-def _exit_code(done: TrackDocument | ReconstructDocument) -> int:
+def _exit_code(done: documents.runs.TrackDocument | documents.runs.ReconstructDocument) -> int:
     """1 if the run ended early or tracked nothing, 130 if it was stopped by hand, else 0."""
     run = done.found
     if run.stop.is_requested:

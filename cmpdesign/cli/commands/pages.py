@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cmpdesign import documents
 from cmpdesign.cli.command import Command, app, examples
 from cmpdesign.cli.options import SourcesArgument
 from cmpdesign.cli.terminal import current_mode, finish, print_document, say
 from cmpdesign.errors import CmpDesignError
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.designs import StudioDocument
-    from cmpdesign.documents.runs import ServeDocument
     from cmpdesign.runtime.opening import Sensors
 
 PortOption = Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free port.")]
@@ -138,7 +137,6 @@ def serve(
     One line on standard output is the server's address; only this machine can connect. Events of the cameras, as a
     gap, are printed. Ctrl-C ends it.
     """
-    from cmpdesign.documents.runs import ServeDocument
     from cmpdesign.runtime.opening import open_sensor
     from cmpdesign.runtime.publish.serving import SensorServer
 
@@ -147,19 +145,18 @@ def serve(
             opened.record(record)
         server = SensorServer(opened, port)
         try:
-            _announce(ServeDocument(address=server.address))
+            _announce(documents.runs.ServeDocument(address=server.address))
             _tell_events(opened)
         finally:
             server.close()
 
 
 def _announce_page(address: str) -> None:
-    from cmpdesign.documents.designs import StudioDocument
 
-    _announce(StudioDocument(address=address))
+    _announce(documents.designs.StudioDocument(address=address))
 
 
-def _announce(found: StudioDocument | ServeDocument) -> None:
+def _announce(found: documents.designs.StudioDocument | documents.runs.ServeDocument) -> None:
     """Print an address: a line, or the document with ``--json``."""
     if current_mode().as_json:
         finish(found)

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import groupby, takewhile
+from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from cmpdesign import documents
 from cmpdesign.api import pictures, sequences, verifying
 from cmpdesign.cli.command import app
 from cmpdesign.cli.derived import command
 from cmpdesign.cli.options import SourcesArgument
-from cmpdesign.cli.records import print_rows
-from cmpdesign.cli.terminal import EXIT_BAD_INPUT, EXIT_NEGATIVE, print_error, print_warning, say, say_text
-from cmpdesign.inputs.texts import visible
-
-if TYPE_CHECKING:
-    from cmpdesign.documents.reading import VerifyDocument
-    from cmpdesign.documents.runs import (
-        CameraFormatPart,
-        CamerasDocument,
-        ListedCameraPart,
-        RenderDocument,
-    )
+from cmpdesign.cli.records import print_parts, print_rows
+from cmpdesign.cli.terminal import EXIT_BAD_INPUT, EXIT_NEGATIVE, print_error, print_warning, say
 
 
 @command(
@@ -34,7 +24,7 @@ if TYPE_CHECKING:
     "cmpdesign render layout.json -o sample.png --pitch 22 --tilt 15 --noise 2",
     "cmpdesign render layout.json -o pressed.png --scene pressed-ball --truth pressed.npz",
 )
-def render(done: RenderDocument) -> None:
+def render(done: documents.runs.RenderDocument) -> None:
     """With a sequence as the scene, a video or a folder of pictures is written."""
     for warning in done.warnings:
         print_warning(warning)
@@ -50,7 +40,9 @@ LayoutsArgument = Annotated[
 ]
 
 
-def _verified(*, layout: LayoutsArgument, images: SourcesArgument, **options: Any) -> VerifyDocument:
+def _verified(
+    *, layout: LayoutsArgument, images: SourcesArgument, **options: Any
+) -> documents.reading.VerifyDocument:
     """The verdicts; the names of further layouts stand before the pictures."""
     layouts = [layout, *(Path(text) for text in takewhile(_is_layout, images))]
     return verifying.verify(layouts, images[len(layouts) - 1 :], **options)
@@ -72,7 +64,7 @@ def _is_layout(text: str) -> bool:
     images=None,
     on_verdict=None,
 )
-def verify(done: VerifyDocument, given: dict[str, Any]) -> int:
+def verify(done: documents.reading.VerifyDocument, given: dict[str, Any]) -> int:
     """Many pictures, videos and cameras are read, too. Exit code: 0 verified, 1 not verified, 2 bad input."""
     errors = [image.error for image in done.images if image.error is not None]
     for error in errors:
@@ -83,27 +75,13 @@ def verify(done: VerifyDocument, given: dict[str, Any]) -> int:
 
 
 @command(app, sequences.cameras, "listing", "cmpdesign cameras", "cmpdesign cameras --json")
-def cameras(found: CamerasDocument) -> None:
+def cameras(found: documents.runs.CamerasDocument) -> None:
     """track takes a camera by its number, its file, its serial number or a part of its name."""
     if not found.cameras:
         say("no camera is connected")
     for camera in found.cameras:
-        say_text("\n".join(map(visible, _lines(camera))) + "\n")
-
-
-def _size_text(each: CameraFormatPart) -> str:
-    rates = ", ".join(f"{fps:g}" for fps in each.fps)
-    return f"{each.size_px[0]}x{each.size_px[1]}" + (f" at {rates}" if rates else "")
-
-
-def _lines(camera: ListedCameraPart) -> Iterator[str]:
-    serial = f", serial {camera.serial}" if camera.serial else ""
-    yield f"camera {camera.number}: {camera.name}{serial}"
-    yield f"  {camera.path}" + (f"  {camera.by_id}" if camera.by_id else "")
-    if camera.problem:
-        yield f"  {camera.problem}"
-    for letters, sizes in groupby(camera.formats, key=lambda each: each.format):
-        yield f"  {letters}  {'; '.join(map(_size_text, sizes))}"
-    for each in camera.ranges:
-        unit = f" {each.unit}" if each.unit else ""
-        yield f"  {each.name}  {each.least:g} to {each.most:g}{unit}, usually {each.usual:g}"
+        print_rows(camera, "number name path serial by_id problem")
+        if camera.formats:
+            print_parts(camera.formats)
+        if camera.ranges:
+            print_parts(camera.ranges)
