@@ -11,7 +11,7 @@ from cmpdesign import documents
 from cmpdesign.api import sequences
 from cmpdesign.cli.command import app
 from cmpdesign.cli.derived import command
-from cmpdesign.cli.records import print_rows
+from cmpdesign.cli.records import print_parts, print_rows
 from cmpdesign.cli.terminal import EXIT_INTERRUPTED, EXIT_NEGATIVE, print_warning, say, say_text
 
 RecoverOption = Annotated[
@@ -76,9 +76,10 @@ def reconstruct(
     """Positions, displacements and normals in mm. Exit code: 0 done, 1 ended early or nothing found, 2 bad input."""
     if done.format == "cmp-recovery":
         return _recovered(done, given)
+    print_parts(done.views)
     print_rows(
         done,
-        "frames views marker_shares positions lost_markers reasons sigma_um systematic_um largest_displacement contact "
+        "frames marker_shares positions lost_markers reasons sigma_um systematic_um largest_displacement contact "
         "time_ms",
     )
     return _exit_code(done)

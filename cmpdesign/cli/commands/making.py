@@ -1,4 +1,4 @@
-"""Designs, sensor files, products and their kerf: ``templates``, ``init``, ``size``, ``build``, ``check``, ``schema``."""
+"""Designs, products and their kerf: ``templates``, ``init``, ``size``, ``build``, ``check``, ``kerf``, ``schema``."""
 
 from __future__ import annotations
 
