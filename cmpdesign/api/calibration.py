@@ -17,10 +17,10 @@ from cmpdesign.watch import tell, warn
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.calibration.camera import CameraCalibration
-    from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.sensor.sensor_file import SensorFile
-    from extractor import LayoutLike, LearntLayout, Markers, Reference, Rig
+    from extractor import LearntLayout, Markers, Reference, Rig
 
 MAX_WAY_MM = 100  # of a step
 # RMS per axis; well above the scatter of a made pad (0.01), below that of a round pattern read as honeycomb (0.2).
@@ -28,7 +28,7 @@ MAX_USUAL_SCATTER_PITCHES = 0.1
 
 
 def calibrate_camera(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
     output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,
@@ -106,7 +106,7 @@ def calibrate_camera(
 
 
 def calibrate_pattern(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
     output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,
@@ -193,7 +193,7 @@ def _pattern_document(learnt: LearntLayout, written: str) -> documents.reading.C
 
 
 def calibrate_rig(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     rig: str | Path,
     rest: str | Path | Sequence[str | Path],
     output: Annotated[str | Path | None, Written(needed=True)] = None,
@@ -271,7 +271,7 @@ def calibrate_check(
     sensor: str | Path,
     images: Annotated[str | Path | Sequence[str | Path], Written(metavar="REST")],
     *,
-    layout: LayoutLike | AnyLayout | None = None,
+    layout: AnyLayout | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> documents.calibration.CalibrateCheckDocument:
     """Check a sensor's calibration by its pad at rest. If it does not hold, the cause and the step to repeat are named.

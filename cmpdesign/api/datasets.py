@@ -12,8 +12,7 @@ from cmpdesign.inputs.options import Written, settled
 from cmpdesign.tracking.jobs.options import ReadingOptions
 
 if TYPE_CHECKING:
-    from cmpdesign.layout.layout import Layout as AnyLayout
-    from extractor import LayoutLike
+    from cmpdesign.api.layouts import AnyLayout
 
 
 def dataset(
@@ -68,7 +67,7 @@ def dataset(
 
 
 def extract(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     sources: str | Path | Sequence[str | Path],
     output: Annotated[str | Path, Written(metavar="FOLDER")],
     *,

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cmpdesign.api.layouts import Layout, build_layout
 from cmpdesign.design.design import Design as Parameters
 from cmpdesign.design.design import load_design
-from cmpdesign.errors import CmpDesignError
-from cmpdesign.inputs.options import Preset
+from cmpdesign.inputs.options import Preset, pixels_of
 from cmpdesign.layout.checks import CAMERA_PX
 from cmpdesign.products.building import Built, Checked, build_files, check_products
 from cmpdesign.products.registry import USUAL_NAMES, chosen_products
@@ -88,7 +87,7 @@ class Design(Parameters):
             read: also draw and read the pads that laser, mold and print would make.
             preset: see ``SequenceOptions``.
         """
-        return check_products(self, self.layout, checked_camera(camera), read=read, preset=preset)
+        return check_products(self, self.layout, pixels_of("camera", camera), read=read, preset=preset)
 
     def write(
         self,
@@ -110,7 +109,7 @@ class Design(Parameters):
             OutputError: a file cannot be written.
         """
         names = chosen_products(products if isinstance(products, str) else ",".join(products))
-        return build_files(self, self.layout, folder, names, checked_camera(camera), preset=preset)
+        return build_files(self, self.layout, folder, names, pixels_of("camera", camera), preset=preset)
 
     def __repr__(self) -> str:
         given = ", ".join(
@@ -159,17 +158,3 @@ def load(
     <Design 'honeycomb': honeycomb, pitch_mm=1.524, layers=3>
     """
     return Design.of(load_design(name_or_path, {**(overrides or {}), **changes}))
-
-
-def checked_camera(camera: tuple[int, int]) -> tuple[int, int]:
-    """The camera's width and height.
-
-    Raises:
-        CmpDesignError: not two whole numbers of 10 px or more.
-    """
-    sides = tuple(camera)
-    if len(sides) != 2 or not all(isinstance(side, int) and side >= 10 for side in sides):
-        raise CmpDesignError(
-            f"camera is {camera!r}; expected (width, height) of 10 px or more, as (640, 480)"
-        )
-    return sides[0], sides[1]

@@ -16,6 +16,8 @@ from cmpdesign.layout.build import build_layout as build
 if TYPE_CHECKING:
     from extractor import LayoutLike, Reference
 
+    AnyLayout = LayoutLike | layouts.Layout
+
 NOTEBOOK_PX = 420  # longer side of a drawing in a notebook
 
 
@@ -105,7 +107,7 @@ def read_layout(path: str | Path) -> Layout:
     return layout_from(path)
 
 
-def layout_from(given: LayoutLike | layouts.Layout) -> Layout:
+def layout_from(given: AnyLayout) -> Layout:
     """The layout that a caller gives as a path, a ``Layout``, a ``Reference`` or the JSON object of a layout file.
 
     Raises:
@@ -120,7 +122,7 @@ def layout_from(given: LayoutLike | layouts.Layout) -> Layout:
     return Layout.of(layout_from_reference(layout_of(given)))
 
 
-def reference_from(given: LayoutLike | layouts.Layout) -> Reference:
+def reference_from(given: AnyLayout) -> Reference:
     """The reader's value of a layout; ``given`` and errors as for ``layout_from``."""
     if isinstance(given, layouts.Layout):
         return Layout.of(given).reference()

@@ -16,10 +16,9 @@ from cmpdesign.inputs.options import Response, Usual, Written, settled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.scene import Scene
     from cmpdesign.scene.files.scene_file import SceneFile
-    from extractor import LayoutLike
 
     OneImage = str | Path | NDArray[Any]
 
@@ -63,7 +62,7 @@ class ViewOptions(TypedDict, total=False):
     response: Annotated[Response, Usual("srgb", metavar="srgb|linear|EXPONENT")]
 
 
-def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -> Scene:
+def plain_scene(layout: AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -> Scene:
     """A scene of a pattern under one camera, without a scene file.
 
     Args:
@@ -101,7 +100,7 @@ def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[Vi
 
 def load_scene(
     name_or_path: str | Path,
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     size: tuple[int, int] | None = None,
     seed: int | None = None,
 ) -> SceneFile:
@@ -123,7 +122,7 @@ def load_scene(
 
 
 def render(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     scene: Annotated[str | Path | None, Written(metavar="FILE")] = None,
     output: Annotated[str | Path | None, Written(metavar="IMAGE", needed=True)] = None,
     truth: Annotated[str | Path | None, Written(metavar="FILE")] = None,

@@ -12,15 +12,15 @@ from cmpdesign.patterns.colors import BLACK, COLORS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.tracking.export.runs import Run
-    from extractor import LayoutLike, Markers
+    from extractor import Markers
 
 # Colors of the statuses lost, measured, repaired, fitted.
 _STATUS_COLORS = ("none", "#00e5ff", "#ffb300", "#ff4081")
 
 
-def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = False) -> Any:
+def plot_layout(layout: AnyLayout, ax: Any = None, *, ids: bool = False) -> Any:
     """Draw a pattern in mm, as seen from the front.
 
     Args:

@@ -13,17 +13,16 @@ from cmpdesign.inputs.options import Written, settled
 from cmpdesign.tracking.jobs.options import ShapeOptions, TrackOptions
 
 if TYPE_CHECKING:
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.inputs.cameras import CameraSettings
-    from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.tracking.jobs.job import ReconstructJob, TrackJob
     from cmpdesign.tracking.sources import FrameSource
-    from extractor import LayoutLike
 
 AnySource = str | Path | int | Sequence[str | Path]
 
 
 def track(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     source: AnySource,
     output: str | Path,
     *,
@@ -56,7 +55,7 @@ def track(
 
 
 def reconstruct(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     rig: str | Path,
     rest: Annotated[str | Path | int | Sequence[str | Path], Written(with_commas=True)],
     source: Annotated[str | Path | int | Sequence[str | Path | int], Written(with_commas=True)],
@@ -90,7 +89,7 @@ def reconstruct(
 
 
 def recover_run(
-    layout: LayoutLike | AnyLayout, output: str | Path, of: Literal["track", "reconstruct"] = "track"
+    layout: AnyLayout, output: str | Path, of: Literal["track", "reconstruct"] = "track"
 ) -> documents.runs.RecoverDocument:
     """Complete the table or recording of a run that was killed, as the commands' ``--recover`` does.
 
@@ -117,7 +116,7 @@ def recover_run(
 
 
 def track_job(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     source: AnySource,
     output: str | Path,
     **options: Unpack[TrackOptions],
@@ -131,7 +130,7 @@ def track_job(
 
 
 def reconstruct_job(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     rig: str | Path,
     rest: str | Path | int | Sequence[str | Path],
     source: str | Path | int | Sequence[str | Path | int],

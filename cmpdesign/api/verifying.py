@@ -20,12 +20,12 @@ from cmpdesign.watch import notice, tell, told
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.products.sheet.verdict import SheetVerdict
     from cmpdesign.reading.problem_report import ProblemReport
     from cmpdesign.reading.verify import Verdict
     from cmpdesign.tracking.source_images import SourceImage
-    from extractor import Extractor, LayoutLike, Reference
+    from extractor import Extractor, Reference
 
     OneImage = str | Path | NDArray[Any]
 
@@ -109,7 +109,7 @@ class Verifier:
 
 
 def verify(
-    layout: LayoutLike | AnyLayout | Sequence[LayoutLike | AnyLayout],
+    layout: AnyLayout | Sequence[AnyLayout],
     images: OneImage | Sequence[OneImage | int],
     output: Annotated[str | Path | None, Written(metavar="FOLDER")] = None,
     *,
@@ -162,7 +162,7 @@ def verify(
         )
     judge = Verifier(layouts_of([reference_from(one) for one in layouts]), **options)
     bundle = None if report is None else _new_report(judge, _layout_text(layouts[0]))
-    files = _Files(judge, _path(output), _path(debug), _path(report), bundle)
+    files = _Files(judge, output, debug, bundle)
     is_one, verdict, parts = isinstance(images, str) or not isinstance(images, Sequence), None, []
     for source in _source_images(judge, [images] if is_one else images, frames, bits):
         if source.image is None and is_one:
@@ -174,7 +174,10 @@ def verify(
         found = _unread(source) if verdict is None else verdict.to_json()
         parts.append({"image": visible(source.name), **found})
     document = _document(judge, parts, verdict if is_one and len(parts) == 1 else None)
-    files.finish(document)
+    if output is not None:
+        write_file(Path(output) / "verify.json", document.to_json())
+    if report is not None and bundle is not None:
+        bundle.write(Path(report))
     return document
 
 
@@ -210,13 +213,12 @@ class _Files:
     Attributes:
         judge: the reader.
         output, debug: folders for overlays and for pictures of stages.
-        report: file of ``bundle``, the report of a problem.
+        bundle: the report of a problem, which is not written yet.
     """
 
     judge: Verifier
-    output: Path | None
-    debug: Path | None
-    report: Path | None
+    output: str | Path | None
+    debug: str | Path | None
     bundle: ProblemReport | None
 
     def judged(self, source: SourceImage) -> Verdict | SheetVerdict | None:
@@ -242,27 +244,19 @@ class _Files:
             reference = self.judge.extractor.layout_of(verdict.markers)
             if self.output is not None:
                 overlay = to_png(draw_markers(image, reference, verdict.markers))
-                write_file(self.output / f"{source.stem}.overlay.png", overlay)
+                write_file(Path(self.output) / f"{source.stem}.overlay.png", overlay)
             if self.debug is not None or self.bundle is not None:
                 stages = draw_stages(image, reference, verdict.markers)
         if self.debug is not None:
             for number, (stage, picture) in enumerate(stages.items(), start=1):
-                write_file(self.debug / f"{source.stem}.{number}-{stage}.png", to_png(picture))
+                write_file(Path(self.debug) / f"{source.stem}.{number}-{stage}.png", to_png(picture))
         if self.bundle is not None:
             self.bundle.add(*source.picture(), verdict.to_json(), stages)
-
-    def finish(self, document: documents.reading.VerifyDocument) -> None:
-        """Write verify.json and the report."""
-        if self.output is not None:
-            write_file(self.output / "verify.json", document.to_json())
-        if self.report is not None and self.bundle is not None:
-            self.bundle.write(self.report)
 
 
 def _document(
     judge: Verifier, images: Sequence[Mapping[str, Any]], found: object
 ) -> documents.reading.VerifyDocument:
-
     codes = [one.code.id for one in judge.family if one.code is not None]
     return documents.reading.VerifyDocument.of(
         found,
@@ -285,7 +279,7 @@ def _new_report(judge: Verifier, layout_text: str) -> ProblemReport:
     return ProblemReport(layout_text, settings)
 
 
-def _layout_text(layout: LayoutLike | AnyLayout) -> str:
+def _layout_text(layout: AnyLayout) -> str:
     """The text of a layout file as it is, or as a layout is written."""
     if isinstance(layout, str | Path):
         from cmpdesign.inputs.files import read_text
@@ -294,7 +288,3 @@ def _layout_text(layout: LayoutLike | AnyLayout) -> str:
     from cmpdesign.api.layouts import layout_from
 
     return layout_from(layout).to_json()
-
-
-def _path(given: str | Path | None) -> Path | None:
-    return None if given is None else Path(given)

@@ -13,9 +13,8 @@ from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
 from cmpdesign.inputs.options import Preset, Response, Written
 
 if TYPE_CHECKING:
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.design.design import Design as Parameters
-    from cmpdesign.layout.layout import Layout as AnyLayout
-    from extractor import LayoutLike
 
 
 def kerf(
@@ -60,7 +59,7 @@ def kerf(
 
 
 def calibrate_gel(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     rig: str | Path,
     output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,

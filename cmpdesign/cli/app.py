@@ -10,22 +10,20 @@ from typing import Annotated
 import typer
 
 from cmpdesign import __version__
-from cmpdesign.cli.command import app, exit_interrupted
-from cmpdesign.cli.commands import (
-    calibrate,
-    datasets,
-    evaluate,
-    following,
-    making,
-    pages,
-    pictures,
+from cmpdesign.cli.command import INTERRUPTED, app
+from cmpdesign.cli.commands import calibrate, datasets, evaluate, making, pages, reading
+from cmpdesign.cli.terminal import (
+    EXIT_BAD_INPUT,
+    EXIT_INTERRUPTED,
+    discard_output,
+    print_document,
+    print_error,
 )
-from cmpdesign.cli.terminal import EXIT_BAD_INPUT, discard_output, print_document, print_error
 from cmpdesign.errors import OutputError
 
 __all__ = ["app", "main"]
 # The modules whose commands stand in no group have added these to ``app``.
-UNGROUPED = (following, making, pages, pictures)
+UNGROUPED = (making, pages, reading)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(datasets.export, name="export")
@@ -59,7 +57,8 @@ def main() -> None:
     try:
         app()
     except KeyboardInterrupt:  # before or after a command
-        exit_interrupted()
+        print_error(INTERRUPTED, EXIT_INTERRUPTED)
+        sys.exit(EXIT_INTERRUPTED)
     except OutputError as error:  # the version
         print_error(error)
         sys.exit(EXIT_BAD_INPUT)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -69,8 +68,8 @@ OUTPUT_OPTIONS = [each for each in get_command(_carrier).params if each.name in 
 
 
 def examples(*lines: str) -> str:
-    """The end of a command's help text: its examples, one line each, without the prompt."""
-    return "\n".join(lines)
+    """The end of a help text: two examples, without the prompt; of a single one, the second prints the document."""
+    return "\n".join(lines if len(lines) > 1 else (*lines, f"{lines[0]} --json"))
 
 
 def _write_examples(epilog: str | None, formatter: Any) -> None:
@@ -203,12 +202,6 @@ def _finish_usage_error(error: Exception) -> None:
         print_error(text)
         raise typer.Exit(EXIT_BAD_INPUT) from None
     error.format_message = lambda: text
-
-
-def exit_interrupted() -> None:
-    """End the program after Ctrl-C outside of commands."""
-    print_error(INTERRUPTED, EXIT_INTERRUPTED)
-    sys.exit(EXIT_INTERRUPTED)
 
 
 app = typer.Typer(

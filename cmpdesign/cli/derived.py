@@ -19,10 +19,10 @@ from typing import Annotated, Any, Union, Unpack, get_args, get_origin
 import typer
 
 from cmpdesign.cli.command import Command, examples
-from cmpdesign.cli.options import COMPLETIONS, parse_pairs, parse_pixels, parse_response
+from cmpdesign.cli.options import COMPLETIONS, parse_pairs, parse_response
 from cmpdesign.cli.progress import working
 from cmpdesign.cli.terminal import finish, print_written
-from cmpdesign.inputs.options import Response, Usual, Written, options_of
+from cmpdesign.inputs.options import Response, Usual, Written, options_of, pixels_of
 from cmpdesign.tracking.jobs.options import ReadingOptions, SequenceOptions
 
 Run = Callable[..., Any]
@@ -267,7 +267,7 @@ def _form(taken: _Taken) -> tuple[Any, Parse]:
         kind = str
     elif sizes:
         most = int(written.most or 99_999)
-        kind, parse = str, lambda text: None if text is None else parse_pixels(option, text, most)
+        kind, parse = str, lambda text: None if text is None else pixels_of(taken.name, text, most)
     elif Path in members or _PythonOnly in members:
         kind = Path
     return Union[kind, None] if taken.default is None else kind, parse  # noqa: UP007

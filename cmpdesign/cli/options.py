@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, cast
 
@@ -42,26 +41,6 @@ COMPLETIONS: Mapping[str, Callable[[str], list[str]]] = {
     "plan": _names("plans"),
     "show": _names(),
 }
-
-
-def parse_pixels(option: str, text: str, largest: int) -> tuple[int, int]:
-    """Width and height from "640x480" or "640 X 480".
-
-    Args:
-        option: name of the option, for the message.
-        text: its value.
-        largest: largest width and height, px.
-
-    Raises:
-        CmpDesignError: another text, or a side that is not from 10 to ``largest``.
-    """
-    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", text, re.ASCII)
-    sides = (int(match[1]), int(match[2])) if match else (0, 0)
-    if min(sides) < 10 or max(sides) > largest:
-        raise CmpDesignError(
-            f"{option} {text}: expected WIDTHxHEIGHT, 10 to {largest} pixels each, as in 640x480"
-        )
-    return sides
 
 
 def parse_pairs(option: str, texts: Sequence[str], key: type, written: Written) -> dict[Any, str]:

@@ -135,13 +135,8 @@ def say(*objects: Any, **options: Any) -> None:
 
 
 def say_table(rows: Mapping[str, str]) -> None:
-    """Print names and their values for people, as a table."""
-    from rich.table import Table
-
-    table = Table(box=None, show_header=False, pad_edge=False)
-    for name, value in rows.items():
-        table.add_row(name, value)
-    say(table)
+    """Print names and their values for people."""
+    say_columns(("", ""), rows.items(), folds=True)
 
 
 def say_columns(headings: Sequence[str], rows: Iterable[Sequence[str]], *, folds: bool = False) -> None:
@@ -154,7 +149,7 @@ def say_columns(headings: Sequence[str], rows: Iterable[Sequence[str]], *, folds
     """
     from rich.table import Table
 
-    table = Table(box=None, pad_edge=False)
+    table = Table(box=None, show_header=any(headings), pad_edge=False)
     for heading in headings:
         justify: Literal["left", "right"] = "right" if heading.startswith(">") else "left"
         table.add_column(heading.removeprefix(">"), justify=justify, overflow="fold" if folds else "ellipsis")
@@ -219,8 +214,3 @@ def finish(done: Document, exit_code: int = 0) -> None:
     print_step("done")
     if exit_code:
         raise typer.Exit(exit_code)
-
-
-def printable_path(path: object) -> str:
-    """The path as text, with unprintable characters escaped."""
-    return visible(str(path))

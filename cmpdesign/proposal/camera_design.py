@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any, NamedTuple, get_args
 
 from cmpdesign.api.designs import Design
 from cmpdesign.documents.designs import SizeDocument
 from cmpdesign.errors import CmpDesignError, parameter
-from cmpdesign.inputs.options import Make
+from cmpdesign.inputs.options import Make, pixels_of
 from cmpdesign.layout.checks import CELL_WARNING_MM, EDGE_WARNING_PX
 from cmpdesign.patterns.graphs import MAX_LAYERS
 from cmpdesign.products.registry import USUAL_NAMES, refusal_of
@@ -26,7 +26,7 @@ BORDER_PITCHES = 0.5
 FEWEST_LAYERS = 2
 # Diameter of the circle inside a cell, and the longest period that the markers' lattice does not resolve, in pitches.
 CELL_PITCHES, PERIOD_PITCHES = 1 / math.sqrt(3), math.sqrt(3)
-LARGEST_SIDE_PX, LARGEST_VIEW_MM = 99_999, 10_000.0
+LARGEST_VIEW_MM = 10_000.0
 MAX_BLUR_PX, MAX_NOISE = 10.0, 50.0
 _PITCH_DECIMALS = 4
 _TWO_NUMBERS = r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*"
@@ -99,10 +99,15 @@ class Proposal(SizeDocument):
 
 
 def propose(
-    camera: object, view: object, error: str | float | None, blur_px: float, noise: float, make: Make | None
+    camera: str | Sequence[int],
+    view: object,
+    error: str | float | None,
+    blur_px: float,
+    noise: float,
+    make: Make | None,
 ) -> Proposal:
     """The proposal of ``size``, whose arguments and errors these are."""
-    pixels, seen_mm = _pixels(camera), _view_mm(view)
+    pixels, seen_mm = Sides(*pixels_of("camera", camera)), _view_mm(view)
     imaging = Imaging(
         _within("blur_px", blur_px, 0.3, MAX_BLUR_PX, "px"),
         _within("noise", noise, 0.1, MAX_NOISE, "of 255"),
@@ -254,18 +259,6 @@ def _unreachable(error: str | float, pixels: Sides, view_mm: Sides, best_mm: flo
 
 def _shown_um(mm: float) -> str:
     return f"{1000 * mm:.3g} um"
-
-
-def _pixels(camera: object) -> Sides:
-    match = re.fullmatch(_TWO_NUMBERS, camera) if isinstance(camera, str) else None
-    sides = match.groups() if match else camera
-    try:
-        width, height = (int(side) for side in sides)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise CmpDesignError(f"camera {camera}: expected WIDTHxHEIGHT in px, as in 1280x960") from None
-    for side in (width, height):
-        _within("camera", side, 10, LARGEST_SIDE_PX, "px")
-    return Sides(width, height)
 
 
 def _view_mm(view: object) -> Sides:

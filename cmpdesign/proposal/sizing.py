@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def size(
-    camera: Annotated[str | tuple[float, float], Written(name="--camera", metavar="WxH")],
+    camera: Annotated[str | tuple[int, int], Written(name="--camera", metavar="WxH")],
     view: Annotated[str | tuple[float, float], Written(name="--view", metavar="WxH")],
     error: Annotated[str | float | None, Written(metavar="LENGTH")] = None,
     output: str | Path | None = None,

@@ -46,7 +46,6 @@ def camera(done: documents.calibration.CalibrateCameraDocument) -> None:
     calibration.calibrate_check,
     "reading pictures",
     "cmpdesign calibrate check index.toml pad.png",
-    "cmpdesign calibrate check index.toml pad.png --json",
     layout=None,
 )
 def check(done: documents.calibration.CalibrateCheckDocument) -> int:
@@ -70,7 +69,6 @@ def check(done: documents.calibration.CalibrateCheckDocument) -> int:
     workshop.calibrate_force,
     "reading the run",
     "cmpdesign calibrate force run.npz weights.csv",
-    "cmpdesign calibrate force run.npz weights.csv --json",
 )
 def force(done: documents.reading.CalibrateForceDocument) -> None:
     """Thickness and marker depth are not fitted: an error of them is part of the modulus."""
@@ -116,7 +114,6 @@ def pattern(done: documents.reading.CalibratePatternDocument) -> None:
     calibration.calibrate_rig,
     "reading pictures",
     "cmpdesign calibrate rig layout.json measured.toml pad.png -o thumb.toml",
-    "cmpdesign calibrate rig layout.json measured.toml pad.png -o thumb.toml --json",
 )
 def rig(done: documents.calibration.CalibrateRigDocument) -> None:
     """The written file holds all of RIG, and is a RIG itself: its deviations reach all displacements of reconstruct."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 from cmpdesign.documents.document import Document
 from cmpdesign.documents.runs import ReconstructDocument, TrackDocument
 from cmpdesign.errors import CmpDesignError, OutputError, parameter
+from cmpdesign.inputs.options import pixels_of
 from cmpdesign.inputs.texts import visible
 from cmpdesign.tracking.jobs.force_readers import contact_reader, contact_tracker
 from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions, TrackOptions
@@ -56,11 +57,12 @@ def reading_of(options: SequenceOptions) -> Reading:
     Raises:
         SourceError: a camera's size or format that cannot be.
     """
-    from cmpdesign.inputs.cameras import CameraSettings, size_from
+    from cmpdesign.inputs.cameras import CameraSettings
     from cmpdesign.tracking.sources import Reading
 
+    size = options["camera_size"]
     camera = CameraSettings(
-        size_from(options["camera_size"]),
+        None if size is None else pixels_of("camera_size", size),
         options["camera_fps"],
         options["camera_format"],
         options["exposure_ms"],
