@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypedDict, Unpack
 
@@ -74,10 +72,10 @@ def plain_scene(layout: AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -
         SceneError: a value out of range; the message names it.
         TypeError: a name that ``ViewOptions`` does not have.
     """
-    from cmpdesign.api.layouts import layout_from
+    from cmpdesign.api.layouts import read_layout
     from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
 
-    pattern, chosen = layout_from(layout), settled(ViewOptions, view)
+    pattern, chosen = read_layout(layout), settled(ViewOptions, view)
     radius_mm = chosen["press_radius_mm"]
     if radius_mm is None:
         radius_mm = min(pattern.size_mm) / 4
@@ -114,11 +112,11 @@ def load_scene(
     Raises:
         CmpDesignError: no such scene, or a value that cannot be rendered.
     """
-    from cmpdesign.api.layouts import layout_from
+    from cmpdesign.api.layouts import read_layout
     from cmpdesign.design.templates import find_scene
     from cmpdesign.scene.files import scene_file
 
-    return scene_file.load_scene(find_scene(name_or_path), layout_from(layout), size_px=size, seed=seed)
+    return scene_file.load_scene(find_scene(name_or_path), read_layout(layout), size_px=size, seed=seed)
 
 
 def render(
@@ -159,8 +157,12 @@ def render(
     """
     require_suffix("truth", truth, ".npz")
     if scene is None:
-        with _scene_errors_name_parameters():
+        from cmpdesign.scene import SceneError
+
+        try:
             plain = plain_scene(layout, seed or 0, **view)
+        except SceneError as error:
+            raise SceneError(_by_parameter(str(error))) from None
         return _render_picture(plain, size or SIZE_PX, output, truth)
     for name in sorted(view):
         key = f"[{SCENE_FILE_TABLES.get(name, 'camera')}] {SCENE_FILE_KEYS.get(name, name)}"
@@ -233,15 +235,8 @@ def _render_sequence(
     )
 
 
-@contextmanager
-def _scene_errors_name_parameters() -> Iterator[None]:
-    """Within this context, errors of a scene name the parameter instead of the scene's field."""
-    from cmpdesign.scene import SceneError
-
-    try:
-        yield
-    except SceneError as error:
-        text = str(error)
-        for name in ViewOptions.__annotations__:
-            text = re.sub(rf"^{SCENE_FILE_KEYS.get(name, name)}(?= is )", parameter(name), text)
-        raise SceneError(text) from None
+def _by_parameter(text: str) -> str:
+    """The message of an error of a scene, which names the parameter instead of the scene's field."""
+    for name in ViewOptions.__annotations__:
+        text = re.sub(rf"^{SCENE_FILE_KEYS.get(name, name)}(?= is )", parameter(name), text)
+    return text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cmpdesign.api.layouts import layout_from
+from cmpdesign.api.layouts import read_layout
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import BLACK, COLORS
@@ -37,7 +37,7 @@ def plot_layout(layout: AnyLayout, ax: Any = None, *, ids: bool = False) -> Any:
     with extra("evaluate"):
         from matplotlib.collections import PolyCollection
 
-    axes, pattern = _axes(ax), layout_from(layout)
+    axes, pattern = _axes(ax), read_layout(layout)
     outline = PolyCollection([pattern.outline_mm], facecolors=[pattern.palette[COLORS[BLACK]]])
     colors = [pattern.palette[COLORS[color]] for color in pattern.cell_color[pattern.colored_cells].tolist()]
     axes.add_collection(outline)

@@ -285,6 +285,6 @@ def _layout_text(layout: AnyLayout) -> str:
         from cmpdesign.inputs.files import read_text
 
         return read_text(layout)
-    from cmpdesign.api.layouts import layout_from
+    from cmpdesign.api.layouts import read_layout
 
-    return layout_from(layout).to_json()
+    return read_layout(layout).to_json()

@@ -37,7 +37,7 @@ def studio(port: PortOption = PORT, host: HostOption = HOST, no_browser: Browser
     """
     from cmpdesign.studio.serving import serve as serve_page
 
-    serve_page(host, port, _announce_page, with_browser=not no_browser)
+    serve_page(host, port, _announce, with_browser=not no_browser)
 
 
 @app.command(
@@ -92,7 +92,7 @@ def view(
         feed = LiveFeed(run.source.name, job.layout, is_paced=not run.source.is_live)
         thread = feed.follow(run)
         try:
-            serve_page(host, port, _announce_page, with_browser=not no_browser, live=feed)
+            serve_page(host, port, _announce, with_browser=not no_browser, live=feed)
         finally:
             run.stop.is_requested = True
             thread.join(_END_S)
@@ -145,23 +145,21 @@ def serve(
             opened.record(record)
         server = SensorServer(opened, port)
         try:
-            _announce(documents.runs.ServeDocument(address=server.address))
+            if current_mode().as_json:
+                finish(documents.runs.ServeDocument(address=server.address))
+            else:
+                print_document(f"{server.address}\n")
             _tell_events(opened)
         finally:
             server.close()
 
 
-def _announce_page(address: str) -> None:
-
-    _announce(documents.designs.StudioDocument(address=address))
-
-
-def _announce(found: documents.designs.StudioDocument | documents.runs.ServeDocument) -> None:
-    """Print an address: a line, or the document with ``--json``."""
+def _announce(address: str) -> None:
+    """Print the page's address: a line, or the document with ``--json``."""
     if current_mode().as_json:
-        finish(found)
+        finish(documents.designs.StudioDocument(address=address))
     else:
-        print_document(f"{found.address}\n")
+        print_document(f"{address}\n")
 
 
 def _tell_events(sensors: Sensors) -> None:

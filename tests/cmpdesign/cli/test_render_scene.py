@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cmpdesign.cli.app import app
+from cmpdesign.cli import app
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
