@@ -136,12 +136,7 @@ def calibrate_pattern(
     from extractor import learn_layout
 
     require_suffix("output", output, ".json")
-    if (
-        output is not None
-        and isinstance(layout, str | Path)
-        and Path(output).resolve() == Path(layout).resolve()
-    ):
-        raise CmpDesignError(f"{output} is the nominal layout itself; give another name")
+    _require_other(output, layout, "the nominal layout itself")
     names, pictures = read_pictures(images, max_pixels)
     learnt = learn_layout(
         reference_from(layout),
@@ -237,8 +232,11 @@ def calibrate_rig(
             raise CmpDesignError(f"{parameter('steps')}: a way of {way_mm:g} mm, limit {MAX_WAY_MM} mm")
     require_suffix("output", output, ".toml")
     sensor, reference = load_sensor_file(rig), reference_from(layout)
-    if output is not None:
-        _require_beside(Path(rig), Path(output))
+    _require_other(output, rig, "RIG itself, whose measured values a further calibration needs")
+    if output is not None and Path(output).resolve().parent != Path(rig).resolve().parent:
+        raise CmpDesignError(
+            f"{output}: write the file beside {rig}, since files are named relative to its folder"
+        )
     given = [rest] if isinstance(rest, str | Path) else list(rest)
     names = [*map(str, given), *map(str, ways.values())]
     found = _read_views(sensor, reference, sensor.rig.without_poses(), names, side, max_pixels)
@@ -315,15 +313,11 @@ def calibrate_check(
     )
 
 
-def _require_beside(rig: Path, output: Path) -> None:
-    if output.resolve() == rig.resolve():
-        raise CmpDesignError(
-            f"{output} is RIG itself, whose measured values a further calibration needs; choose another name"
-        )
-    if output.resolve().parent != rig.resolve().parent:
-        raise CmpDesignError(
-            f"{output}: write the file beside {rig}, since files are named relative to its folder"
-        )
+def _require_other(output: str | Path | None, given: object, what: str) -> None:
+    """Check that the file to write is not the given one."""
+    if output is not None and isinstance(given, str | Path):
+        if Path(output).resolve() == Path(given).resolve():
+            raise CmpDesignError(f"{output} is {what}; choose another name")
 
 
 def _read_views(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypedDict, Unpack
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 from cmpdesign import documents
 from cmpdesign.errors import CmpDesignError, parameter
@@ -210,12 +211,6 @@ def _render_picture(
     )
 
 
-class RenderedSequence(NamedTuple):
-    """What a sequence leaves beside its files: warnings, one of each kind."""
-
-    warnings: tuple[str, ...]
-
-
 def _render_sequence(
     file: SceneFile, output: Path, truth: str | Path | None
 ) -> documents.runs.RenderDocument:
@@ -226,7 +221,7 @@ def _render_sequence(
         kind = "".join(letter for letter in text if letter.isalpha())
         kinds.setdefault(kind, f"from frame {frame} ({file.time_s(frame):.3g} s) on: {text}")
     return documents.runs.RenderDocument.of(
-        RenderedSequence(tuple(kinds.values())),
+        SimpleNamespace(warnings=tuple(kinds.values())),
         written=[str(path) for path in (truth, output) if path is not None],
         size_px=file.size_px,
         frames=file.frames,

@@ -72,15 +72,20 @@ def examples(*lines: str) -> str:
     return "\n".join(lines if len(lines) > 1 else (*lines, f"{lines[0]} --json"))
 
 
-def _write_examples(epilog: str | None, formatter: Any) -> None:
-    """One line an example, unwrapped, so that it can be copied."""
-    if epilog:
-        with formatter.section("Examples"):
-            for line in epilog.splitlines():
-                formatter.write(f"{'':{formatter.current_indent}}$ {line}\n")
+class _WithExamples:
+    """A command or group whose help text ends with examples."""
+
+    epilog: str | None
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """One line an example, unwrapped, so that it can be copied."""
+        if self.epilog:
+            with formatter.section("Examples"):
+                for line in self.epilog.splitlines():
+                    formatter.write(f"{'':{formatter.current_indent}}$ {line}\n")
 
 
-class Command(TyperCommand):
+class Command(_WithExamples, TyperCommand):
     """A command with ``--json``, ``--quiet`` and ``--verbose``, which its function does not receive.
 
     It refuses "-" for a file or folder: no command reads standard input or writes files to output.
@@ -88,9 +93,6 @@ class Command(TyperCommand):
 
     def __init__(self, name: str | None, *, params: list[Any] | None = None, **options: Any) -> None:
         super().__init__(name, params=[*(params or []), *OUTPUT_OPTIONS], **options)
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        _write_examples(self.epilog, formatter)
 
     def get_help(self, ctx: Any) -> str:
         """The help text without Python's types of arguments, as in "SOURCE <list[str]>"."""
@@ -124,11 +126,8 @@ class Command(TyperCommand):
         return option if value is None else f"{option} {value}"
 
 
-class Group(TyperGroup):
-    """A group of commands, whose help text ends with examples."""
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        _write_examples(self.epilog, formatter)
+class Group(_WithExamples, TyperGroup):
+    """A group of commands."""
 
 
 def new_group(help_text: str, *shown: str) -> typer.Typer:

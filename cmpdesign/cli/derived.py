@@ -237,11 +237,8 @@ def _parameter(taken: _Taken, meanings: Mapping[str, str]) -> inspect.Parameter:
 
 def _members(kind: Any) -> list[Any]:
     """The types of a union, without None."""
-    return [each for each in (get_args(kind) if _is_union(kind) else [kind]) if each is not NoneType]
-
-
-def _is_union(kind: Any) -> bool:
-    return get_origin(kind) in (Union, UnionType)
+    kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+    return [each for each in kinds if each is not NoneType]
 
 
 def _form(taken: _Taken) -> tuple[Any, Parse]:

@@ -28,10 +28,7 @@ app = new_group("Measure the properties of one sensor from its pictures.", CAMER
 def camera(done: documents.calibration.CalibrateCameraDocument) -> None:
     """A picture that does not agree with the others is left out, with a reason."""
     print_maps(done, "parameters deviations")
-    print_rows(
-        done,
-        "model response rms_px scale ray_px sheet_bend_mm held further_view further_view_ray_px",
-    )
+    print_rows(done, "model response rms_px scale ray_px sheet_bend_mm held further_view further_view_ray_px")
     for one in done.pictures:
         if one.rms_px is None:
             print_warning(f"{one.picture} is {one.cause}")
@@ -64,12 +61,7 @@ def check(done: documents.calibration.CalibrateCheckDocument) -> int:
     return EXIT_NEGATIVE
 
 
-@command(
-    app,
-    workshop.calibrate_force,
-    "reading the run",
-    "cmpdesign calibrate force run.npz weights.csv",
-)
+@command(app, workshop.calibrate_force, "reading the run", "cmpdesign calibrate force run.npz weights.csv")
 def force(done: documents.reading.CalibrateForceDocument) -> None:
     """Thickness and marker depth are not fitted: an error of them is part of the modulus."""
     say(f"young_mpa = {done.young_mpa:.4g}\nyoung_sigma_mpa = {done.young_sigma_mpa:.2g}")

@@ -65,9 +65,7 @@ def experiment(
 
 
 @experiment(
-    "cmpdesign evaluate precision -o precision --trials 10",
-    QUICK,
-    trials="places for every object and cube",
+    "cmpdesign evaluate precision -o precision --trials 10", QUICK, trials="places for every object and cube"
 )
 def precision(report: Report) -> Table:
     """Measure the error on five pressed objects, and the edge fitting error of a cube."""
@@ -97,10 +95,7 @@ def reliability(report: Report) -> Table:
     }
 
 
-@experiment(
-    "cmpdesign evaluate angles -o angles",
-    "cmpdesign evaluate angles -o angles --workers 2 --json",
-)
+@experiment("cmpdesign evaluate angles -o angles", "cmpdesign evaluate angles -o angles --workers 2 --json")
 def angles(report: Report) -> Table:
     """Measure how far a single cell can deform or turn before the cell is lost, against eqs. 1 and 2."""
     rows = {}

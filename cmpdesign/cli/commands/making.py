@@ -44,11 +44,7 @@ TAKERS = {
 
 
 @command(
-    app,
-    making.templates,
-    "listing",
-    "cmpdesign templates --kind scenes",
-    "cmpdesign templates --show tac3d",
+    app, making.templates, "listing", "cmpdesign templates --kind scenes", "cmpdesign templates --show tac3d"
 )
 def templates(found: documents.designs.TemplatesDocument | documents.designs.TemplateDocument) -> None:
     """Templates are designs, scenes, plans of data sets, machines, materials, silicones and sensors."""

@@ -43,8 +43,7 @@ def studio(port: PortOption = PORT, host: HostOption = HOST, no_browser: Browser
 @app.command(
     cls=Command,
     epilog=examples(
-        "cmpdesign view layout.json 0",
-        "cmpdesign view layout.json press.mp4 -o run.npz --no-browser",
+        "cmpdesign view layout.json 0", "cmpdesign view layout.json press.mp4 -o run.npz --no-browser"
     ),
 )
 def view(
@@ -109,8 +108,7 @@ def view(
 )
 def serve(
     sensors: Annotated[
-        list[Path],
-        typer.Argument(metavar="SENSOR", help="Sensor files with a [camera].", show_default=False),
+        list[Path], typer.Argument(metavar="SENSOR", help="Sensor files with a [camera].", show_default=False)
     ],
     output: Annotated[
         list[str] | None,
@@ -145,19 +143,16 @@ def serve(
             opened.record(record)
         server = SensorServer(opened, port)
         try:
-            if current_mode().as_json:
-                finish(documents.runs.ServeDocument(address=server.address))
-            else:
-                print_document(f"{server.address}\n")
+            _announce(server.address, documents.runs.ServeDocument)
             _tell_events(opened)
         finally:
             server.close()
 
 
-def _announce(address: str) -> None:
-    """Print the page's address: a line, or the document with ``--json``."""
+def _announce(address: str, document: Any = None) -> None:
+    """Print an address: a line, or with ``--json`` its document; without another one that of the page."""
     if current_mode().as_json:
-        finish(documents.designs.StudioDocument(address=address))
+        finish((document or documents.designs.StudioDocument)(address=address))
     else:
         print_document(f"{address}\n")
 
