@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.pooled import grouped, rms_of
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.scenes import (
@@ -34,9 +34,10 @@ from benchmarks.suites.scoring.squares import (
     calibrations_by_position,
     picture_squares,
 )
+from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_SIZE
-from extractor.presets import PRESETS, Preset
+from extractor.presets import PRESETS
 
 SEEDS, QUICK_SEEDS = 5, 2
 # layers that fit the image at the larger edges
@@ -99,11 +100,12 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[MeasuredCa
     rendered = [render(replace(scene, seed=seed), size=STANDARD_SIZE) for seed in range(seeds)]
     visible = rendered[0].truth.visible
     true = rendered[0].truth.marker_xy_px
+    tolerance_px = WRONG_SHARE * shortest_edges(scene.layout, true)
     for preset in PRESETS:
         extractor = cached_extractor(case, preset)
         read = [extractor.extract(picture.image) for picture in rendered]
         errors = np.array([markers.xy_px for markers in read]) - true
-        wrong = np.linalg.norm(errors, axis=2) > WRONG_SHARE * shortest_edges(scene.layout, true)
+        wrong = [wrong_markers(markers, true, tolerance_px).any_kind & visible for markers in read]
         found = np.isfinite(errors[..., 0]) & visible
         good = found & inner
         inner_d2 = [
@@ -111,19 +113,14 @@ def measure_case(group: str, case: SceneCase, seeds: int) -> Iterator[MeasuredCa
             for error, markers, chosen in zip(errors, read, good, strict=True)
         ]
         result = AccuracyResult(
-            group, case_name(group, case), preset, float(found[:, visible].mean()), int((wrong & found).sum()),
-            rms(errors[good]), bounds[0], rms(errors[found]), bounds[1],
+            group, case_name(group, case), preset, float(found[:, visible].mean()), int(np.sum(wrong)),
+            rms_of(errors[good]), bounds[0], rms_of(errors[found]), bounds[1],
             float(abs(errors[good].mean(axis=0)).max()) if good.any() else float("nan"),
             summarise(inner_d2).z.value,
             float(np.min([markers.timings_ms.get("refine", np.nan) for markers in read])),
         )  # fmt: skip
         truths = [picture.truth for picture in rendered]
         yield MeasuredCase(result, tuple(map(picture_squares, read, truths)))
-
-
-def rms(errors: NDArray[np.float64]) -> float:
-    """Root mean square; NaN without values."""
-    return float(np.sqrt(np.mean(errors**2))) if len(errors) else float("nan")
 
 
 def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
@@ -137,28 +134,16 @@ def results_table(title: str, results: Sequence[AccuracyResult]) -> Table:
     return Table(title, COLUMNS, rows)
 
 
-def squares_by_preset(measured: Sequence[MeasuredCase]) -> dict[str, list[PictureSquares]]:
-    """The squares of all cases' pictures by preset."""
-    return {
-        preset: [squares for case in measured if case.result.preset == preset for squares in case.squares]
-        for preset in PRESETS
-    }
-
-
 def markdown(results: Sequence[AccuracyResult]) -> str:
     """One row per case, columns per preset: error over the bound, and z."""
-    head = " | ".join(f"{preset}: of the bound | z" for preset in PRESETS)
-    lines = [f"| | bound px | {head} | bias px |", "|---" * (3 + 2 * len(PRESETS)) + "|"]
-    for name in dict.fromkeys(r.case for r in results):
-        by_preset: dict[Preset, AccuracyResult] = {r.preset: r for r in results if r.case == name}  # type: ignore[misc]
-        cells = [name, f"{by_preset['balanced'].inner_bound_px:.4f}"]
-        for preset in PRESETS:
-            cells += [
-                f"{by_preset[preset].inner_px / by_preset[preset].inner_bound_px:.2f}",
-                f"{by_preset[preset].z:.2f}",
-            ]
-        lines.append(f"| {' | '.join(cells)} | {by_preset['accurate'].bias_px:.4f} |")
-    return "\n".join(lines)
+    columns = {"": TEXT, "bound px": ".4f"}
+    for preset in PRESETS:
+        columns |= {f"{preset}: of the bound": ".2f", f"{preset}: z": ".2f"}
+    rows = []
+    for name, some in grouped(results, "case").items():
+        of_presets = [value for r in some for value in (r.inner_px / r.inner_bound_px, r.z)]
+        rows.append((name, some[0].inner_bound_px, *of_presets, some[-1].bias_px))
+    return Table("", columns | {"bias px": ".4f"}, rows).markdown()
 
 
 def page(measured: Mapping[str, Any]) -> Page:
@@ -182,8 +167,8 @@ def measure(quick: bool = False) -> Shown:
         results += own
         yield results_table(f"{group}; sRGB pictures, {seeds} noises", own)
         stated = {
-            preset: calibrations_by_position(pictures)
-            for preset, pictures in squares_by_preset(of_group).items()
+            preset: calibrations_by_position([squares for case in cases for squares in case.squares])
+            for preset, cases in grouped(of_group, "result.preset").items()
         }
         named = {
             f"{preset}: {name}": one for preset, by_name in stated.items() for name, one in by_name.items()

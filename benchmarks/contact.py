@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
 from cmpdesign.contact import Ball, Contact, Cube, Elastomer, Indenter, Motion, Punch, Ring, solve
 from cmpdesign.contact.elastic_layer.green import green_kernels
@@ -76,7 +77,7 @@ def contact_row(case: Case, runs: int, markers_mm: Array) -> tuple[object, ...]:
     force = np.linalg.norm(found.force_n - fine.force_n) / np.linalg.norm(fine.force_n)
     return (
         case.name, int(found.in_contact.sum()), found.iterations, cold.cpu_s, warm_s, cold.wall_s,
-        float(np.sqrt(np.mean(error_um**2))), float(error_um.max()), 100 * float(force),
+        rms_of(error_um), float(error_um.max()), 100 * float(force),
     )  # fmt: skip
 
 

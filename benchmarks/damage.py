@@ -9,74 +9,43 @@ visible cell, that is measured or repaired.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Found, OptionError, Shown
 from benchmarks.frame.parallel import PROCESSES, results_of
-from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.pooled import Columns, grouped, pooled_table, share, total
+from benchmarks.frame.table import Table
 from benchmarks.suites.scoring.calibration import Calibration, calibration_table
 from benchmarks.suites.scoring.reading import (
     CaseReading,
     CaseResult,
     draw_overlay,
-    find_wrong_markers,
     notable_lines,
     read_case,
 )
 from benchmarks.suites.scoring.report import result_line
 from benchmarks.suites.scoring.squares import calibrations_by_position
-from benchmarks.suites.stress.frames import PATTERNS, CaseImage
+from benchmarks.suites.stress.frames import PATTERNS
 from benchmarks.suites.stress.kinds import StressCase
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
-from extractor import Markers
 
 SEED = 5000
-COLUMNS = {
-    "kind": TEXT, "images": "d", "unread": "d", "visible": "d", "reported": "d", "wrong": "d", "ids": "d", "lost": "d",
-    "sure": "d", "kept": ".2%",
-}  # fmt: skip
+COLUMNS: Columns = {
+    "images": ("d", len),
+    "unread": ("d", lambda results: sum(bool(one.reason) for one in results)),
+    "visible": ("d", total("score.visible")),
+    "reported": ("d", total("score.reported")),
+    "wrong": ("d", total("score.wrong")),
+    "ids": ("d", total("score.others")),
+    "lost": ("d", total("score.lost")),
+    "sure": ("d", lambda results: total("score.sure")(read_in(results))),
+    "kept": (".2%", lambda results: share("score.kept", "score.sure")(read_in(results))),
+}
 
 
-@dataclass(frozen=True)
-class DamageResult:
-    """One image.
-
-    Attributes:
-        others: wrong markers that lie nearer to another marker's true position than to their own.
-    """
-
-    result: CaseResult
-    others: int
-
-
-@dataclass(frozen=True)
-class DamageTotal:
-    """All images of one kind. Counts are of markers; ``unread`` counts images without any marker.
-
-    Attributes:
-        lost: visible and not reported.
-        sure, kept: see ``MarkerScore``; only of images with markers.
-        seeds: names of the images with wrong markers, and the numbers of these.
-        calibrations: errors over stated covariances, by how positions were found.
-    """
-
-    kind: str
-    images: int
-    unread: int
-    raised: int
-    visible: int
-    reported: int
-    wrong: int
-    others: int
-    lost: int
-    sure: int
-    kept: int
-    seeds: tuple[tuple[str, int], ...]
-    calibrations: dict[str, Calibration]
+def read_in(results: Sequence[CaseResult]) -> list[CaseResult]:
+    """Those with markers."""
+    return [one for one in results if not one.reason]
 
 
 def sample_cases(images: int, seed: int) -> list[StressCase]:
@@ -108,69 +77,25 @@ def parse_case(name: str) -> StressCase:
     return StressCase(kind, 0, pattern, int(seed))
 
 
-def count_swapped_markers(shot: CaseImage, markers: Markers) -> int:
-    """The number of wrong markers that lie nearer to another marker's true position than to their own."""
-    wrong, truth = find_wrong_markers(shot, markers)
-    true_px: NDArray[np.float64] = truth.marker_xy_px
-    distance_px = np.linalg.norm(markers.xy_px[wrong][:, None] - true_px, axis=2)
-    return int((distance_px.argmin(axis=1) != np.flatnonzero(wrong)).sum()) if wrong.any() else 0
+def read_damaged(case: StressCase) -> CaseResult:
+    return read_case(case, 1, timing=False).result
 
 
-def read_damaged(case: StressCase) -> DamageResult:
-    result, shot, markers = read_case(case, 1, timing=False)
-    return DamageResult(
-        result, count_swapped_markers(shot, markers) if markers is not None and result.score.wrong else 0
-    )
+def by_kind(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
+    """The images of each kind, and all of them."""
+    return {**grouped(results, "case.kind"), "together": list(results)}
 
 
-def total_of_kind(kind: str, entries: Sequence[DamageResult]) -> DamageTotal:
-    """The totals of the images of one kind."""
-    results = [entry.result for entry in entries]
-    read_in = [entry.score for entry in results if not entry.reason]
-    scores = [entry.score for entry in results]
-    return DamageTotal(
-        kind=kind,
-        images=len(results),
-        unread=len(results) - len(read_in),
-        raised=sum(entry.raised for entry in results),
-        visible=sum(entry.visible for entry in scores),
-        reported=sum(entry.reported for entry in scores),
-        wrong=sum(entry.wrong for entry in scores),
-        others=sum(entry.others for entry in entries),
-        lost=sum(entry.lost for entry in scores),
-        sure=sum(entry.sure for entry in read_in),
-        kept=sum(entry.kept for entry in read_in),
-        seeds=tuple((case_name(entry.case), entry.score.wrong) for entry in results if entry.score.wrong),
-        calibrations=calibrations_by_position([entry.squares for entry in results]),
-    )
-
-
-def totals_by_kind(results: Sequence[DamageResult]) -> list[DamageTotal]:
+def totals_table(results: Sequence[CaseResult]) -> Table:
     """One row per kind, and one of all images."""
-    kinds = [kind.name for kind in RANDOM_KINDS]
-    rows = [
-        total_of_kind(kind, [entry for entry in results if entry.result.case.kind == kind]) for kind in kinds
-    ]
-    return [*(row for row in rows if row.images), total_of_kind("together", results)]
+    return pooled_table("random damage", "kind", COLUMNS, by_kind(results))
 
 
-def totals_table(rows: Sequence[DamageTotal]) -> Table:
-    """One row per kind, and one of all images."""
-    return Table(
-        "random damage",
-        COLUMNS,
-        [
-            (r.kind, r.images, r.unread, r.visible, r.reported, r.wrong, r.others, r.lost, r.sure,
-             r.kept / r.sure if r.sure else None)
-            for r in rows
-        ],
-    )  # fmt: skip
-
-
-def wrong_lines(together: DamageTotal) -> list[str]:
-    """The images with wrong markers."""
-    lines = [f"WRONG {count:>4}  {name}" for name, count in together.seeds]
-    return [*lines, *[f"RAISED {together.raised} images"] * bool(together.raised)]
+def wrong_lines(results: Sequence[CaseResult]) -> list[str]:
+    """The images with wrong markers, and the number of those that raised."""
+    lines = [f"WRONG {one.score.wrong:>4}  {case_name(one.case)}" for one in results if one.score.wrong]
+    raised = sum(one.raised for one in results)
+    return [*lines, *[f"RAISED {raised} images"] * bool(raised)]
 
 
 def save_image(read: CaseReading, folder: Path) -> None:
@@ -208,15 +133,17 @@ def measure(
         if save:
             save_image(read, save)
         return Found(failed=read.result.score.wrong > 0 or read.result.raised)
-    rows = totals_by_kind(results_of(read_damaged, sample_cases(images, seed), processes))
-    yield totals_table(rows)
-    yield from wrong_lines(rows[-1])
+    results = results_of(read_damaged, sample_cases(images, seed), processes)
+    yield totals_table(results)
+    yield from wrong_lines(results)
     found: dict[str, Calibration] = {
-        f"{row.kind}: {position}": stated for row in rows for position, stated in row.calibrations.items()
+        f"{kind}: {position}": stated
+        for kind, of_kind in by_kind(results).items()
+        for position, stated in calibrations_by_position([one.squares for one in of_kind]).items()
     }
     yield calibration_table("errors over covariances", found)
     yield f"{images} images, seeds {seed} to {seed + images - 1}"
-    return Found(failed=any(row.wrong or row.raised for row in rows))
+    return Found(failed=any(one.score.wrong or one.raised for one in results))
 
 
 main = Experiment("damage", measure)

@@ -17,6 +17,7 @@ from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.scenes import WRONG_SHARE, cached_reference, shortest_edges
+from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.scene import Camera, render, standard_layout, standard_scene
 from extractor import Extractor, Status
 
@@ -55,7 +56,7 @@ def measure_speed(name: str, layers: int, pitch_px: float, size: tuple[int, int]
         stages.append(markers.timings_ms)
     true_px = rendered.truth.marker_xy_px
     measured = markers.status == Status.MEASURED
-    off = np.hypot(*(markers.xy_px - true_px).T) > WRONG_SHARE * shortest_edges(layout, true_px)
+    off = wrong_markers(markers, true_px, WRONG_SHARE * shortest_edges(layout, true_px)).any_kind
     return Speed(
         name, size[0] * size[1] / 1e6, int(rendered.truth.visible.sum()), int(measured.sum()),
         int((off & measured).sum()), float(np.median(total[2:])), min(total[2:]),

@@ -3,20 +3,8 @@
 from __future__ import annotations
 
 from benchmarks.frame.experiment import Experiment, Shown
-from benchmarks.frame.table import TEXT, Table
-from benchmarks.suites.coupons.measure import (
-    GROUPS,
-    CouponErrors,
-    pool_errors,
-    read_case,
-    standard_coupon,
-)
+from benchmarks.suites.coupons.measure import CouponErrors, kerfs_table, read_case, standard_coupon
 from cmpdesign.products.laser.coupon.picture import PhotoError
-
-COLUMNS = {
-    "": TEXT, "pictures": "d", "mean um": "+.2f", "RMS um": ".2f", "worst picture": ".2f", "stated um": ".2f",
-    "z": ".2f", "> 3": ".1%",
-}  # fmt: skip
 
 
 def measure(pictures: int = 200, seed: int = 11) -> Shown:
@@ -33,9 +21,7 @@ def measure(pictures: int = 200, seed: int = 11) -> Shown:
             errors.append(read_case(coupon, number, seed))
         except PhotoError as error:
             refused.append(f"picture {number}: {error}")
-    of_groups = {name: [one for one in errors if belongs(one.case)] for name, belongs in GROUPS.items()}
-    rows = [(name, *pool_errors(chosen)) for name, chosen in of_groups.items() if chosen]
-    yield Table("kerfs", COLUMNS, rows)
+    yield kerfs_table(errors)
     yield "\n  ".join([f"seed {seed}; refused: {len(refused)}", *refused])
 
 

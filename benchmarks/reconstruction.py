@@ -23,20 +23,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.suites.halves import placed_views, rig_of, two_cameras
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
-from cmpdesign.scene import Optics, Pinhole, Plain, Scene, Sensor, cramer_rao, render
-from cmpdesign.scene.standard import BLACK_RGB, INKS
+from cmpdesign.scene import Scene, cramer_rao, render, standard_scene
 from extractor import (
     Field,
     Reconstructor,
-    Rig,
     Shape,
     ShapeTracker,
-    View,
     ViewExtractor,
     parse_layout,
     triangulate,
@@ -47,7 +46,6 @@ Surface = Callable[[Array], Array]
 
 FRAMES, QUICK_FRAMES = 8, 2
 ROUNDS, QUICK_ROUNDS = 12, 2  # of the frames of a press, for times
-DISTORTION = (-0.08, 0.03, 0.0005, -0.0008, 0.0)
 
 
 class SensorSetup(NamedTuple):
@@ -86,31 +84,6 @@ FIRST_MM, STEP_MM, STEPS = 0.1, 0.04, 10  # of the press whose times are measure
 GRID = 64  # points of a field along each axis
 
 
-def make_cameras(size: tuple[int, int], angle_deg: float, distance_mm: float) -> tuple[Pinhole, ...]:
-    """Cameras of the left and the right half of the image, behind the pattern."""
-    width, height = size[0] // 2, size[1]
-    return tuple(
-        Pinhole.looking(
-            size,
-            distance_mm=distance_mm,
-            field_of_view_deg=44.0,
-            tilt_deg=angle_deg,
-            azimuth_deg=azimuth,
-            roll_deg=roll,
-            back=True,
-            distortion=DISTORTION,
-            area_px=(k * width, 0, width, height),
-            name=name,
-        )
-        for k, (name, azimuth, roll) in enumerate((("left", 180.0, 1.5), ("right", 0.0, -1.0)))
-    )
-
-
-def make_rig(views: tuple[Pinhole, ...]) -> Rig:
-    """A rig with intrinsics and without poses."""
-    return Rig(tuple(View(v.name, v.focal_px, v.centre_px, v.distortion, v.area_px) for v in views))
-
-
 @dataclass(frozen=True, eq=False)
 class RestedSensor:
     """A sensor after its rest frame: the scene without surface, and what reads its images."""
@@ -123,31 +96,24 @@ class RestedSensor:
     @classmethod
     def of(cls, setup: SensorSetup) -> RestedSensor:
         layout = build_layout(load_design("tac3d"))
-        views = make_cameras(*setup)
-        scene = Scene(
-            layout=layout, camera=views, background=Plain(BLACK_RGB), optics=Optics(1.0), sensor=Sensor(noise=2.0),
-            inks=INKS, seed=1000,
-        )  # fmt: skip
+        views = two_cameras(
+            setup.size,
+            (1.5, -1.0),
+            distance_mm=setup.distance_mm,
+            field_of_view_deg=44.0,
+            tilt_deg=setup.angle_deg,
+        )
+        scene = replace(standard_scene(layout, seed=1000), camera=views)
         reference = parse_layout(layout_to_json(layout))
-        extractor = ViewExtractor(reference, make_rig(views))
+        extractor = ViewExtractor(reference, rig_of(views))
         rest = extractor.extract(render(scene, size=setup.size).image)
         return cls(scene, setup.size, extractor, Reconstructor(reference, extractor.rig, rest))
 
-    @property
-    def placed(self) -> list[View]:
-        """The views with their true poses."""
-        return [
-            View(
-                v.name, v.focal_px, v.centre_px, v.distortion, v.area_px, None, v.R_camera_from_layout,
-                v.t_camera_from_layout_mm,
-            )
-            for v in self.scene.camera
-        ]  # fmt: skip
-
     def implied_deviation_um(self, xyz: Array, cov_px2: Array, shown: NDArray[np.bool_]) -> tuple[float, ...]:
         """RMS deviation per axis that pixel covariances imply with exact poses of the views."""
-        pixels = np.stack([view.project(xyz) for view in self.placed])
-        cov = triangulate(self.placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
+        placed = placed_views(self.scene.camera)
+        pixels = np.stack([view.project(xyz) for view in placed])
+        cov = triangulate(placed, pixels, cov_px2).cov_mm2[shown][:, [0, 1, 2], [0, 1, 2]]
         return tuple(float(v) for v in 1e3 * np.sqrt(np.nanmean(cov, axis=0)))
 
     def state_row(self, state: str, surface: Surface | None, frames: int) -> tuple[object, ...]:
@@ -183,7 +149,7 @@ class RestedSensor:
         return (
             state, float(known.mean()), found_um, stated_um, image_um, bound_ratio(found_um, stated_um),
             bound_ratio(found_um, image_um), float(np.sqrt(squares.mean())), rms_um(np.concatenate(moved)),
-            rms_um(np.concatenate(virtual)), float(np.sqrt(np.nanmean(np.square(tilts)))),
+            rms_um(np.concatenate(virtual)), rms_of(tilts),
             tuple(1e3 * np.median(times, axis=0)),
         )  # fmt: skip
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.suites.halves import two_cameras
 from benchmarks.suites.scanlines import ImageWindow, measure_render_error
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.scene import Dent, Pinhole, Scene, composed, render, standard_layout, standard_scene
@@ -27,6 +28,7 @@ SIZE = (640, 480)
 REPEATS, QUICK_REPEATS = 40, 5
 LIMIT_MS = {"flat": 50.0, "pressed": 120.0, "steep, parts hidden": 120.0}  # of CPU time, the median
 TURN_DEG = 30.0
+UNDISTORTED = (0.0,) * 5
 BARREL = (-0.2, 0.05, 0.001, -0.002, 0.0)
 
 
@@ -41,26 +43,21 @@ def make_scenes(grid: int = 256) -> dict[str, Scene]:
     lens = Pinhole.looking(
         SIZE, distance_mm=32, field_of_view_deg=48, tilt_deg=12, roll_deg=TURN_DEG, distortion=BARREL
     )
-    halves = [
-        Pinhole.looking(
-            SIZE,
-            distance_mm=46,
-            field_of_view_deg=30,
-            tilt_deg=14,
-            azimuth_deg=azimuth,
-            roll_deg=TURN_DEG,
-            back=True,
-            mirror=True,
-            area_px=(x, 0, 320, 480),
-        )
-        for azimuth, x in ((180, 0), (0, 320))
-    ]
+    halves = two_cameras(
+        SIZE,
+        (TURN_DEG, TURN_DEG),
+        distance_mm=46,
+        field_of_view_deg=30,
+        tilt_deg=14,
+        mirror=True,
+        distortion=UNDISTORTED,
+    )
     surface = contact.surface()
     return {
         "flat": flat,
         "distorted": replace(flat, camera=lens),
         "pressed": replace(flat, camera=back, surface=surface),
-        "pressed, two views": replace(flat, camera=tuple(halves), surface=surface),
+        "pressed, two views": replace(flat, camera=halves, surface=surface),
     }
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
 
@@ -24,19 +25,15 @@ from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import (
     Camera,
-    Optics,
-    Plain,
     Press,
     Rendered,
-    Scene,
-    Sensor,
     Shear,
     Twist,
     composed,
     render,
     standard_layout,
+    standard_scene,
 )
-from cmpdesign.scene.standard import BLACK_RGB, INKS
 from extractor import FrameStatus, StartKind, Tracked, Tracker, parse_layout
 
 FRAMES, QUICK_FRAMES = 2000, 120
@@ -100,16 +97,7 @@ def render_sequence(layout: Layout, count: int, jerky: bool) -> Iterator[Rendere
                 239.5 + 8 * np.sin(1.3 * turn) + offset[1],
             ),
         )
-        scene = Scene(
-            layout=layout,
-            camera=camera,
-            surface=surface,
-            background=Plain(BLACK_RGB),
-            optics=Optics(1.0),
-            sensor=Sensor(noise=2.0),
-            inks=INKS,
-            seed=index,
-        )
+        scene = replace(standard_scene(layout, seed=index), camera=camera, surface=surface)
         rendered = render(scene, size=SIZE)
         if jerky and index and index % BLACK_EVERY < BLACK_FRAMES and index > BLACK_EVERY:
             rendered = Rendered(np.zeros_like(rendered.image), rendered.truth)

@@ -23,12 +23,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
 
-from benchmarks.ablation.report import comparison_row, merged, page
+from benchmarks.ablation.report import comparison_row, merged, page, rules_table, times_table
 from benchmarks.frame.experiment import COMMIT, Experiment, Found, OptionError, Shown
-from benchmarks.suites.ablation.comparison import Change, Comparison, compare
+from benchmarks.suites.ablation.comparison import Comparison, compare
 from benchmarks.suites.ablation.pictures import POOLED, PROVOKING, KeptPicture, keep_pictures
-from benchmarks.suites.ablation.rule import Kind, Rule
-from benchmarks.suites.ablation.rules import BY_NAME, RULES
+from benchmarks.suites.ablation.rules import BY_NAME, RULES, Kind, Rule
 from benchmarks.suites.ablation.trial import PictureScore, read_without
 from benchmarks.suites.code_copy import CodeCopy
 from extractor.presets import Preset
@@ -39,11 +38,6 @@ SUITES: dict[Kind, tuple[str, ...]] = {
     "no wrong id": (PROVOKING,),
 }
 TOGETHER: tuple[Kind, ...] = ("accuracy", "no wrong id")  # whose pictures are of different suites
-HEAD = (
-    f"{'rule':<22}{'stage':<11}{'kind':<13}{'pictures':>9}{'touched':>8}{'ids':>9}{'positions':>10}"
-    f"{'lost':>8}{'difference, 95 %':>27}{'RMS px':>9}{'difference in %, 95 %':>27}{'typical':>9}"
-    f"{'difference in %, 95 %':>27}{'z':>12}{'beyond %':>12}{'time':>6}  verdict"
-)
 
 
 def scores_by_suite(
@@ -109,29 +103,6 @@ def try_together(
             )
 
 
-def comparison_line(found: Comparison) -> str:
-    """The line of a rule below ``HEAD``."""
-    return (
-        f"{found.rule.name:<22}{found.rule.stage:<11}{found.rule.kind:<13}{found.pictures:>9}{found.touched:>8}"
-        f"{_pair(found.wrong_ids):>9}{_pair(found.wrong_positions):>10}"
-        f"{found.lost.full:>8.0f}{_interval(found.lost, 1.0, 0):>27}"
-        f"{found.rms_px.full:>9.4f}{_interval(found.rms_px, 100 / found.rms_px.full, 2):>27}"
-        f"{found.typical_px.full:>9.4f}{_interval(found.typical_px, 100 / found.typical_px.full, 2):>27}"
-        f"{found.z[0]:>6.2f}>{found.z[1]:.2f}"
-        f"{100 * found.beyond.full:>7.2f}>{100 * found.beyond.without:.2f}{found.time_ratio:>7.2f}  {found.verdict}"
-    )
-
-
-def _pair(counts: tuple[int, int]) -> str:
-    return f"{counts[0]}>{counts[1]}"
-
-
-def _interval(change: Change, unit: float, digits: int) -> str:
-    """The difference and its interval, times the unit."""
-    value, low, high = (unit * number for number in (change.difference, change.low, change.high))
-    return f"{value:+.{digits}f} [{low:+.{digits}f}, {high:+.{digits}f}]"
-
-
 def measure(
     rule: tuple[str, ...] = (),
     together: bool = False,
@@ -170,15 +141,16 @@ def measure(
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         kept = [one for suite in suites for one in keep_pictures(suite, pictures, seed, Path(folder))]
-        yield HEAD
         comparisons: Iterable[Comparison] = (
             try_together(rules, kinds, kept, preset)
             if together
             else try_rules(rules, kept, preset, processes)
         )
         for comparison in comparisons:
-            rows.append(comparison_row(comparison))
-            yield comparison_line(comparison)
+            rows.append({**comparison_row(comparison), "seed": seed})
+            yield f"{comparison.rule.name}: {comparison.verdict}"
+    yield rules_table(rows)
+    yield times_table(rows)
     yield f"{len(kept)} pictures"
     return Found({"seed": seed, "rows": rows})
 

@@ -6,10 +6,11 @@ A row is a rule that was ever tried, on the pictures of one seed.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.frame.published import Page
+from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.ablation.comparison import Comparison
 from benchmarks.suites.ablation.rules import BY_NAME
 
@@ -44,54 +45,61 @@ def merged_rows(
     return [row for of_rule in by_rule.values() for row in of_rule.values()]
 
 
+def rules_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """What is counted; changes in percent of the figure with the rule, with their intervals."""
+    columns = dict.fromkeys(
+        ("rule", "of", "seed", "pictures", "changed", "wrong ids", "wrong positions", "lost, %", "RMS, %")
+        + ("typical RMS, %", "by the figures"),
+        TEXT,
+    )
+    return Table(
+        "rules",
+        columns,
+        [
+            (
+                row["rule"], row["stage"], str(row["seed"]), str(row["pictures"]), str(row["touched"]),
+                *("{} > {}".format(*row[name]) for name in ("wrong_ids", "wrong_positions")),
+                *(_share(row[name]) for name in ("lost", "rms_px", "typical_px")), row["verdict"],
+            )
+            for row in rows
+        ],
+    )  # fmt: skip
+
+
+def times_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """True errors and time, of the rules that are judged by these."""
+    columns = dict.fromkeys(("rule", "seed", "z", "beyond three deviations, %", "processor time"), TEXT)
+    return Table(
+        "errors and time",
+        columns,
+        [
+            (
+                row["rule"], str(row["seed"]), "{:.2f} > {:.2f}".format(*row["z"]),
+                f"{100 * row['beyond']['full']:.2f} > {100 * row['beyond']['without']:.2f}",
+                f"{row['time_ratio']:.2f}",
+            )
+            for row in rows
+            if row["kind"] == "errors and time" and "beyond" in row
+        ],
+    )  # fmt: skip
+
+
 def page(measured: Mapping[str, Any]) -> Page:
     """The tables of docs/explanation/rules.md from the content of docs/measured/ablation.json."""
     rows = measured["rows"]
-    lines = [
-        "| rule | of | seed | pictures | changed | wrong ids | wrong positions | lost, % | RMS, % | typical RMS, % "
-        "| by the figures | rule |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
-        *(_line(row) for row in rows),
-    ]
-    timed = [row for row in rows if row["kind"] == "errors and time" and "beyond" in row]
-    more = [
-        "| rule | seed | z | beyond three deviations, % | processor time |",
-        "|---|---|---|---|---|",
-        *(
-            f"| {row['rule']} | {row['seed']} | {row['z'][0]:.2f} > {row['z'][1]:.2f} "
-            f"| {100 * row['beyond']['full']:.2f} > {100 * row['beyond']['without']:.2f} "
-            f"| {row['time_ratio']:.2f} |"
-            for row in timed
-        ),
-    ]
-    commands = dict.fromkeys(row["command"] for row in rows)
-    written = ["Written by", *(f"`{command}`" for command in commands)]
-    return Page({"ablation": "\n".join([*lines, "", *more, "", "\n".join(written)])})
-
-
-def _line(row: Mapping[str, Any]) -> str:
-    fate = "stays" if row["rule"] in BY_NAME else "deleted"
-    counts = (f"{before} > {after}" for before, after in (row["wrong_ids"], row["wrong_positions"]))
-    shares = (_share(row[name]) for name in ("lost", "rms_px", "typical_px"))
-    cells = (
-        row["rule"],
-        row["stage"],
-        row["seed"],
-        row["pictures"],
-        row["touched"],
-        *counts,
-        *shares,
-        row["verdict"],
-        fate,
-    )
-    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+    table = rules_table(rows)
+    fates = [(*row, "stays" if row[0] in BY_NAME else "deleted") for row in table.rows]
+    ruled = Table("", {**table.columns, "today": TEXT}, fates).markdown()
+    commands = dict.fromkeys(f"`{row['command']}`" for row in rows)
+    written = "\n".join(["Written by", *commands])
+    return Page({"ablation": f"{ruled}\n\n{times_table(rows).markdown()}\n\n{written}"})
 
 
 def _share(change: Mapping[str, float | None]) -> str:
-    """The difference and its interval, in percent of the figure with the rule; "-" where nothing is left to measure."""
+    """The difference and its interval, in percent of the figure with the rule; "-" where either is nothing."""
     values = [change[name] for name in ("full", "without", "low", "high")]
     full, without, low, high = (math.nan if value is None else value for value in values)
-    if math.isnan(full + without + low + high):
+    if not full or math.isnan(full + without + low + high):
         return "-"
     unit = 100 / full
     return f"{unit * (without - full):+.1f} [{unit * low:+.1f}, {unit * high:+.1f}]"

@@ -16,16 +16,17 @@ BLUE, GREY = "#0072b2", "#444444"
 
 def curve_table(points: Sequence[Point], own: Point) -> Table:
     """A row for each threshold."""
-    columns = {"threshold": "g", "reported": ",", "wrong ids": "d", "wrong": "d", "per million": ".1f"}
-    columns |= {"95 % below": ".1f", "lost": ",", "of today's": ".3f", "": TEXT}
+    columns = {"threshold, edges": TEXT, "reported": ",", "wrong ids": "d", "wrong positions": "d"}
+    columns |= {"per million": ".1f", "95 % below": ".1f", "lost": ",", "of today's": ".3f"}
     rows = [
         (
-            one.threshold, one.reported, one.wrong_ids, one.wrong_positions, one.wrong_per_million,
-            one.upper_per_million, one.lost, one.lost / own.lost, "holds" if one.holds(own) else "",
+            f"{one.threshold:g}{' (today)' * (one == own)}", one.reported, one.wrong_ids, one.wrong_positions,
+            one.wrong_per_million, one.upper_per_million, one.lost, one.lost / own.lost,
         )
         for one in points
     ]  # fmt: skip
-    return Table("wrong positions against lost markers", columns, rows)
+    holds = ", ".join(f"{one.threshold:g}" for one in points if one.holds(own))
+    return Table("wrong positions against lost markers", columns, rows, f"holds: {holds or 'none'}")
 
 
 def own_point(measured: Mapping[str, Any]) -> Point:
@@ -40,21 +41,10 @@ def measured_points(measured: Mapping[str, Any]) -> list[Point]:
 
 def page(measured: Mapping[str, Any]) -> Page:
     """The block and the picture from the content of docs/measured/acceptance.json."""
-    points, own = measured_points(measured), own_point(measured)
-    rows = [
-        f"![Wrong positions against lost markers](../images/{IMAGE})",
-        "",
-        "| threshold, edges | reported | wrong ids | wrong positions | per million | 95 % below | lost | of today's |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    rows += [
-        f"| {one.threshold:g}{' (today)' if one.threshold == own.threshold else ''} | {one.reported:,} "
-        f"| {one.wrong_ids} | {one.wrong_positions} | {one.wrong_per_million:.1f} | {one.upper_per_million:.1f} "
-        f"| {one.lost:,} | {one.lost / own.lost:.3f} |"
-        for one in points
-    ]
-    rows += ["", f"Written by `{measured['command']}`: {measured['pictures']:,} pictures."]
-    return Page({"acceptance": "\n".join(rows)}, {IMAGE: curve_picture(measured)})
+    table = curve_table(measured_points(measured), own_point(measured)).markdown()
+    picture = f"![Wrong positions against lost markers](../images/{IMAGE})"
+    written = f"Written by `{measured['command']}`: {measured['pictures']:,} pictures."
+    return Page({"acceptance": f"{picture}\n\n{table}\n\n{written}"}, {IMAGE: curve_picture(measured)})
 
 
 def curve_picture(measured: Mapping[str, Any]) -> bytes:

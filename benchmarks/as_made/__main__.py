@@ -26,6 +26,7 @@ from benchmarks.as_made.pads import (
     shoot_contact,
 )
 from benchmarks.frame.experiment import COMMIT, Experiment, OptionError, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.scoring.calibration import COLUMNS, calibration_values, summarise
 from benchmarks.suites.stress.frames import PATTERNS
@@ -69,7 +70,7 @@ def pooled_rows(errors: Mapping[str, Sequence[Errors]]) -> list[tuple[object, ..
     for name, of_pictures in errors.items():
         error = np.concatenate([each.error for each in of_pictures])
         bound = np.concatenate([each.bound for each in of_pictures])
-        rms = float(np.sqrt(np.nanmean(error**2)))
+        rms = rms_of(error)
         of_bound = rms / float(np.sqrt(np.nanmean(bound))) if np.isfinite(bound).any() else None
         stated = calibration_values(summarise([each.squared for each in of_pictures]))
         rows.append((name, (1e3 if name == PLACES else 1.0) * rms, of_bound, *stated))

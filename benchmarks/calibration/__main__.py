@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from benchmarks.frame.experiment import Experiment, Found, OptionError, Shown
 from benchmarks.frame.parallel import PROCESSES, results_of
-from benchmarks.frame.table import TEXT, Table
-from benchmarks.suites.calibration.reading import SuiteJob, calibration_rows, in_order, read_pictures
+from benchmarks.suites.calibration.reading import SuiteJob, calibrations_by_suite, in_order, read_pictures
 from benchmarks.suites.calibration.suites import suites_by_name, usual_seed
-from benchmarks.suites.scoring.calibration import COLUMNS, calibration_values
+from benchmarks.suites.scoring.calibration import calibration_table
 from extractor.presets import PRESETS
 
 PARTS = 8  # jobs per suite
@@ -51,11 +50,8 @@ def measure(
         for part in range(PARTS)
     ]
     readings = in_order(results_of(read_pictures, jobs, processes, chunk=1))
-    rows = calibration_rows(readings)
-    for key in dict.fromkeys((row.preset, row.suite) for row in rows):
-        chosen = [row for row in rows if (row.preset, row.suite) == key]
-        values = [(f"{row.kind}: {row.positions}", *calibration_values(row.calibration)) for row in chosen]
-        yield Table(", ".join(key), {"errors over covariances": TEXT} | COLUMNS, values)
+    for title, found in calibrations_by_suite(readings).items():
+        yield calibration_table(title, found)
     pictures = len({(reading.suite, reading.number) for reading in readings})
     yield f"{pictures} pictures, seed of {', '.join(f'{name} {own}' for name, own in seeds.items())}"
     return Found({"seeds": seeds})

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.tracking import render_sequence
 from cmpdesign.files.images import to_png
@@ -87,11 +88,6 @@ def png_files(images: Sequence[NDArray[np.uint8]]) -> Coded:
     return Coded(list(images), sum(sizes) / 1e3 / len(images), ms)
 
 
-def rms(values: NDArray[np.float64]) -> float:
-    """Root mean square of the known values."""
-    return float(np.sqrt(np.nanmean(values**2)))
-
-
 def codec_row(
     name: str, coded: Coded, read: Sequence[Markers], png: Sequence[Markers], truth: Sequence[Rendered]
 ) -> tuple[object, ...]:
@@ -101,8 +97,9 @@ def codec_row(
     sigma_px = np.sqrt(np.stack([one.cov_px2[:, [0, 1], [0, 1]] for one in read]))
     error_px, moved_px = xy_px - true_px, xy_px - png_px
     return (
-        name, rms(moved_px), float(np.nanmax(np.abs(moved_px))), rms(error_px), rms(error_px) / rms(png_px - true_px),
-        rms(error_px / sigma_px), float(np.mean([one.status == 0 for one in read])), coded.kb, coded.ms,
+        name, rms_of(moved_px), float(np.nanmax(np.abs(moved_px))), rms_of(error_px),
+        rms_of(error_px) / rms_of(png_px - true_px), rms_of(error_px / sigma_px),
+        float(np.mean([one.status == 0 for one in read])), coded.kb, coded.ms,
     )  # fmt: skip
 
 

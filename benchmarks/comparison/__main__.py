@@ -20,8 +20,13 @@ from dataclasses import asdict, replace
 from typing import Literal
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
-from benchmarks.suites.comparison.measure import CASES, MethodResult, measure_case
-from benchmarks.suites.comparison.pooled import measure_pooled, pooled_cases
+from benchmarks.suites.comparison.measure import (
+    CASES,
+    MethodResult,
+    measure_case,
+    measure_pooled,
+    pooled_cases,
+)
 from benchmarks.suites.comparison.report import page, pooled_table, scene_table
 
 REPETITIONS, QUICK_REPETITIONS = 11, 3

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from benchmarks.force.seen import seen_from
 from benchmarks.force.truth import DEPTHS_MM, FRICTION, TRUTH, YOUNG_MPA, Case, cases
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
 from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
@@ -146,7 +147,16 @@ def summary(found: list[Errors]) -> Table:
             z = _known(getattr(one, z_name) for one in mine) if z_name else np.empty(0)
             if len(values):
                 worst = float(np.abs(values).max())
-                rows.append((half, quantity, len(values), _rms(values), worst, _rms(z) if len(z) else None))
+                rows.append(
+                    (
+                        half,
+                        quantity,
+                        len(values),
+                        rms_of(values),
+                        worst,
+                        rms_of(z) if len(z) else None,
+                    )
+                )
     columns = {"frames": TEXT, "error of": TEXT, "number": "d", "rms": ".4f", "worst": ".4f", "z": ".2f"}
     return Table(f"frames above {MIN_N} N", columns, rows)
 
@@ -154,10 +164,6 @@ def summary(found: list[Errors]) -> Table:
 def _known(values: Iterable[float | Array]) -> Array:
     flat = np.concatenate([np.empty(0), *(np.atleast_1d(value) for value in values)])
     return flat[np.isfinite(flat)]
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt((values**2).mean()))
 
 
 def measure(
@@ -205,8 +211,8 @@ def measure(
 def row_of(one: Errors) -> tuple[object, ...]:
     """The row of ``COLUMNS``."""
     return (
-        one.name, one.press_n, one.shear_share, one.normal, one.normal_z, one.shear, _rms(one.shear_z), one.torque,
-        _rms(one.torque_z), 1e3 * one.centre_mm, one.radius, one.utilisation, one.regions, *one.times_ms,
+        one.name, one.press_n, one.shear_share, one.normal, one.normal_z, one.shear, rms_of(one.shear_z), one.torque,
+        rms_of(one.torque_z), 1e3 * one.centre_mm, one.radius, one.utilisation, one.regions, *one.times_ms,
     )  # fmt: skip
 
 

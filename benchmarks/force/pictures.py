@@ -19,12 +19,12 @@ from benchmarks.force.__main__ import COLUMNS, MIN_N, Errors, errors_of, reader_
 from benchmarks.force.truth import DEPTHS_MM, TRUTH, Case, cases
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import Table
-from benchmarks.suites.medium.rigs import DISTORTION, RandomRig
+from benchmarks.suites.halves import two_cameras
+from benchmarks.suites.medium.rigs import RandomRig
 from cmpdesign import build_layout
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
-from cmpdesign.scene import Medium, Optics, Pinhole, Plain, Scene, Sensor, render
-from cmpdesign.scene.standard import BLACK_RGB, INKS
+from cmpdesign.scene import Medium, Scene, render, standard_scene
 from extractor import Markers, Reconstructor, ViewExtractor, parse_layout
 
 Array = NDArray[np.float64]
@@ -46,20 +46,10 @@ def sensor_of(thickness_mm: float) -> Seeing:
     """Two cameras below the pad of the truth; noise 2 of 255, blur 1 px."""
     layout = build_layout(load_design("honeycomb", {"mirrored": "true"}))
     medium = Medium(thickness_mm - DEPTH_MM, 1.41, WINDOW_MM, 1.49)
-    width = SIZE[0] // 2
-    cameras = tuple(
-        Pinhole.looking(
-            SIZE, distance_mm=DISTANCE_MM, field_of_view_deg=FIELD_DEG, tilt_deg=TILT_DEG, azimuth_deg=azimuth,
-            back=True, distortion=DISTORTION, area_px=(k * width, 0, width, SIZE[1]), name=name,
-        )
-        for k, (name, azimuth) in enumerate((("left", 180.0), ("right", 0.0)))
-    )  # fmt: skip
-    rig = RandomRig(DISTANCE_MM, TILT_DEG, medium, layout, cameras)
+    cameras = two_cameras(SIZE, distance_mm=DISTANCE_MM, field_of_view_deg=FIELD_DEG, tilt_deg=TILT_DEG)
+    rig = RandomRig(medium, layout, cameras)
     views = ViewExtractor(parse_layout(layout_to_json(layout)), rig.rig(medium))
-    scene = Scene(
-        layout, camera=cameras, background=Plain(BLACK_RGB), optics=Optics(1.0), sensor=Sensor(noise=2.0), inks=INKS,
-        medium=medium,
-    )  # fmt: skip
+    scene = replace(standard_scene(layout), camera=cameras, medium=medium)
     return Seeing(rig, scene, views, views.extract(render(scene, size=SIZE).image))
 
 

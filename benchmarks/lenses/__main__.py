@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 import cmpdesign
 from benchmarks.frame.experiment import Experiment, Found, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import Table
 from benchmarks.suites.lenses.boards import board_error_px, by_opencv
 from benchmarks.suites.lenses.cameras import SIZE_PX, random_camera
@@ -35,7 +36,6 @@ from benchmarks.suites.lenses.scoring import (
     parameters_z,
     pooled_row,
     rays_z,
-    rms,
     seen_pixels,
 )
 from benchmarks.suites.scenes import standard_layout
@@ -81,8 +81,8 @@ def calibrate_one(condition: str, seed: int, number: int, chessboards: bool) -> 
         condition=condition,
         field_deg=camera.field_deg,
         model=found.model.name,
-        image_px=rms(ray_differences(found.camera, true, pixel_grid(SIZE_PX))),
-        seen_px=rms(ray_differences(found.camera, true, seen)),
+        image_px=rms_of(ray_differences(found.camera, true, pixel_grid(SIZE_PX))),
+        seen_px=rms_of(ray_differences(found.camera, true, seen)),
         stated_px=float(np.sqrt(np.nanmean(np.trace(cov, axis1=1, axis2=2)) / 2)),
         z=rays_z(found, true, seen),
         parameters_z=parameters_z(found, true),
@@ -149,13 +149,13 @@ def corners_text(path: Path) -> str:
     ]
     for name, solve in solvers.items():
         whole = solve(sheet, sightings)
-        inside = rms(np.array([placed_px(whole, one) for one in sightings]))
+        inside = rms_of(np.array([placed_px(whole, one) for one in sightings]))
         left = np.zeros(len(sightings))
         for fold in range(FOLDS):
             part = solve(sheet, [one for i, one in enumerate(sightings) if i % FOLDS != fold])
             left[fold::FOLDS] = [placed_px(part, one) for one in sightings[fold::FOLDS]]
         lines.append(
-            f"  {name:36s} {inside:.3f}   {rms(left):.3f}   {np.nanmedian(left):.3f}   {np.isnan(left).sum()}"
+            f"  {name:36s} {inside:.3f}   {rms_of(left):.3f}   {np.nanmedian(left):.3f}   {np.isnan(left).sum()}"
         )
     found = calibrate_points(sheet, sightings, SIZE_PX)
     refused = [f"{one.picture} ({one.cause})" for one in found.pictures if not one.used]

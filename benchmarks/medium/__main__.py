@@ -13,22 +13,40 @@ the reader.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from benchmarks.frame.experiment import Experiment, Shown
-from benchmarks.frame.table import TEXT, Table
-from benchmarks.suites.medium.errors import ROWS, TRUE, DepthErrors, measure_rig, pool
+from benchmarks.frame.pooled import Columns, Figure, grouped, joined, mean, percentile, pooled_table
+from benchmarks.suites.medium.errors import ROWS, TRUE, DepthErrors, measure_rig
 from benchmarks.suites.medium.rigs import PRESSES_MM, random_rig
 
 RIGS, QUICK_RIGS = 24, 2
-TRUE_COLUMNS = {
-    "press": TEXT, "frames": "d", "mean error um": ".2f", "limit um": ".2f", "bias um": ".2f", "z position": ".2f",
-    "z displacement": ".2f",
-}  # fmt: skip
-WRONG_COLUMNS = {
-    "assumption": TEXT, "mean error um": ".2f", "bias um": ".2f", "short %": ".2f", "least, most": ".2f",
-    "z position": ".2f", "z displacement": ".2f", "misfit at rest": ".2f", "warned %": ".0f",
-}  # fmt: skip
+
+
+def z_of(name: str) -> Figure:
+    """The RMS of errors over covariances, all markers together."""
+    return lambda frames: float(np.sqrt(joined(frames, name).mean()))
+
+
+def short_range(frames: Sequence[DepthErrors]) -> tuple[float, float]:
+    """The smallest and the largest share by which displacements are too small."""
+    short = [each.short_percent for each in frames]
+    return min(short), max(short)
+
+
+DEPTHS: Columns = {"mean error um": (".2f", mean("mean_um")), "bias um": (".2f", mean("bias_um"))}
+Z: Columns = {"z position": (".2f", z_of("position")), "z displacement": (".2f", z_of("displacement"))}
+TRUE_COLUMNS: Columns = {"frames": ("d", len), **DEPTHS, "limit um": (".2f", mean("limit_um")), **Z}
+WRONG_COLUMNS: Columns = {
+    **DEPTHS,
+    "short %": (".2f", mean("short_percent")),
+    "least, most": (".2f", short_range),
+    **Z,
+    "misfit at rest": (".2f", percentile("misfit", 50)),
+    "warned %": (".0f", mean("warned_percent")),
+}
 
 
 def measure(quick: bool = False, seed: int = 0) -> Shown:
@@ -43,28 +61,15 @@ def measure(quick: bool = False, seed: int = 0) -> Shown:
         rng = np.random.default_rng([seed, number])
         errors += measure_rig(random_rig(rng), rng)
     true = [each for each in errors if each.row == TRUE]
-    by_press = [
-        pool(f"{low:g} to {high:g} mm", [each for each in true if low <= each.press_mm <= high])
+    by_press = {
+        f"{low:g} to {high:g} mm": [each for each in true if low <= each.press_mm <= high]
         for low, high in PRESSES_MM
-    ]
-    yield Table(
-        "with the true constants",
-        TRUE_COLUMNS,
-        [
-            (p.label, p.frames, p.mean_um, p.limit_um, p.bias_um, p.z_position, p.z_displacement)
-            for p in (*by_press, pool("all", true))
-        ],
+    }
+    yield pooled_table("with the true constants", "press", TRUE_COLUMNS, {**by_press, "all": true})
+    by_row = grouped(errors, "row")
+    yield pooled_table(
+        "what the reader assumes", "assumption", WRONG_COLUMNS, {row: by_row[row] for row in ROWS}
     )
-    by_row = [pool(row, [each for each in errors if each.row == row]) for row in ROWS]
-    yield Table(
-        "what the reader assumes",
-        WRONG_COLUMNS,
-        [
-            (p.label, p.mean_um, p.bias_um, p.short_percent, p.short_range_percent, p.z_position,
-             p.z_displacement, p.misfit, p.warned_percent)
-            for p in by_row
-        ],
-    )  # fmt: skip
 
 
 main = Experiment("medium", measure)

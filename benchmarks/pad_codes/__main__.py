@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from typing import Literal
 
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.parallel import PROCESSES
 from benchmarks.frame.table import TEXT, Table
-from benchmarks.pad_codes.beside import CODE, SUITES, figures_of
-from benchmarks.pad_codes.crops import counted, read_crops
+from benchmarks.pad_codes.beside import beside_table
+from benchmarks.pad_codes.crops import crops_table
 from benchmarks.pad_codes.families import VIEWS, told_apart
 from benchmarks.pad_codes.parts import measured
 from benchmarks.pad_codes.times import CASES, least_ms
 from benchmarks.pad_codes.windows import placed_windows
 
-COLUMNS = {"parts": "d", "right": ".2%", "wrong": "d"}
-
-
-CROP_COLUMNS = {
-    "crops": "d",
-    "numbered": ".1%",
-    "wrong ids": "d",
-    "plain numbered": ".1%",
-    "plain wrong ids": "d",
-}
-BESIDE_COLUMNS = {
-    "pictures": "d", "unread": "d", "reported": ".1%", "wrong": "d", "RMS px": ".4f", "z": ".2f",
-}  # fmt: skip
 Part = Literal["all", "windows", "parts", "crops", "families", "beside", "times"]
 
 
@@ -54,12 +43,7 @@ def measure(
     if only in ("all", "parts"):
         yield parts_table(layers, parts, seed)
     if only in ("all", "crops"):
-        found = counted(list(read_crops(crops, seed, processes))).items()
-        rows = [
-            (g, n.crops, n.coded / max(n.crops, 1), n.coded_wrong, n.plain / max(n.crops, 1), n.plain_wrong)
-            for g, n in found
-        ]
-        yield Table("crops of pads of 5 to 11 layers", {"in view": TEXT, **CROP_COLUMNS}, rows)
+        yield crops_table(crops, seed, processes)
     if only in ("all", "families"):
         yield families_table(layers, pictures, seed)
     if only in ("all", "beside"):
@@ -69,30 +53,28 @@ def measure(
     return None
 
 
+def verdict_table(title: str, head: str, counts: Mapping[str, Counter[str]]) -> Table:
+    """A row for the verdicts of each group."""
+    rows = [
+        (group, found.total(), found["right"] / found.total(), found["wrong"])
+        for group, found in counts.items()
+    ]
+    return Table(title, {head: TEXT, "parts": "d", "right": ".2%", "wrong": "d"}, rows)
+
+
 def parts_table(layers: int, parts: int, seed: int) -> Table:
-    counts = sorted(measured(layers, parts, seed).items())
-    rows = [(group, found.total(), found["right"] / found.total(), found["wrong"]) for group, found in counts]
-    return Table(f"{layers} layers, {parts} parts", {"bits": TEXT, **COLUMNS}, rows)
+    counts = dict(sorted(measured(layers, parts, seed).items()))
+    return verdict_table(f"{layers} layers, {parts} parts", "bits", counts)
 
 
 def families_table(layers: int, pictures: int, seed: int) -> Table:
-    rows = []
+    counts = {}
     for pads, share in VIEWS:
-        own, foreign = told_apart(layers, pads, share, pictures, seed)
-        for name, found in (("own", own), ("others", foreign)):
-            group = f"{pads} pads, {share:.0%} in view, {name}"
-            rows.append((group, found.total(), found["right"] / found.total(), found["wrong"]))
-    return Table(f"pads of a family, {layers} layers", {"pictures of": TEXT, **COLUMNS}, rows)
-
-
-def beside_table(pictures: int, seed: int, processes: int) -> Table:
-    rows = []
-    for suite in SUITES:
-        for name, code in (("coded", CODE), ("plain", 0)):
-            found = figures_of(suite, code, pictures, seed, processes)
-            row = found.unread, found.reported, found.wrong, found.rms_px, found.z
-            rows.append((f"{suite}, {name}", pictures, *row))
-    return Table("coded pads and plain ones", {"pads": TEXT, **BESIDE_COLUMNS}, rows)
+        for name, found in zip(
+            ("own", "others"), told_apart(layers, pads, share, pictures, seed), strict=True
+        ):
+            counts[f"{pads} pads, {share:.0%} in view, {name}"] = found
+    return verdict_table(f"pads of a family, {layers} layers", "pictures of", counts)
 
 
 def times_table(readings: int) -> Table:

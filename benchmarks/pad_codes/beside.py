@@ -6,125 +6,80 @@ camera suite.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cache, partial
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 
 from benchmarks.frame.parallel import results_of
-from benchmarks.suites.camera.cases import make_cases, sample_chain
-from benchmarks.suites.camera.shoot import shoot
-from benchmarks.suites.scenes import SCENE_KINDS, WRONG_SHARE, SceneCase, shortest_edges, standard_layout
-from benchmarks.suites.scoring.calibration import squared_distances, summarise
+from benchmarks.frame.pooled import Columns, pooled_table, share, total
+from benchmarks.frame.table import Table
+from benchmarks.suites.camera.cases import CameraCase, sample_chain
+from benchmarks.suites.camera.reading import PictureResult, cached_extractor, rms_px, score_picture
+from benchmarks.suites.camera.shoot import CameraPicture, shoot
+from benchmarks.suites.scenes import SCENE_KINDS, SceneCase, standard_layout
+from benchmarks.suites.scoring.calibration import stated_columns
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame
 from benchmarks.suites.stress.random_damage import RANDOM_KINDS
-from cmpdesign.files.layout_json import layout_to_json
-from cmpdesign.layout.layout import Layout
-from cmpdesign.scene import render
 from cmpdesign.scene.standard import STANDARD_LAYERS, STANDARD_SIZE, standard_scene
-from extractor import Extractor, Status, parse_layout
 
 CODE = 7
+COLUMNS: Columns = {
+    "pictures": ("d", len),
+    "unread": ("d", total("is_unread")),
+    "reported": (".1%", share("reported", "visible")),
+    "wrong": ("d", lambda results: total("wrong_ids")(results) + total("wrong_places")(results)),
+    "RMS px": (".4f", rms_px),
+    "z": stated_columns(lambda result: result.d2)["z"],
+}
 
 
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """A picture (H, W, 3) uint8 BGR, the pad's layout, the markers' true positions (M, 2), and which are visible."""
-
-    image: NDArray[np.uint8]
-    layout: Layout
-    marker_xy_px: NDArray[np.float64]
-    visible: NDArray[np.bool_]
+def _frame_picture(frame: PatternFrame) -> CameraPicture:
+    shot = frame.shoot()
+    return CameraPicture(shot.image, frame.layout, shot.truths[0].marker_xy_px, shot.truths[0].visible)
 
 
-@dataclass(frozen=True, eq=False)
-class PictureCounts:
-    """What was read of a picture: numbers of markers; (N, 2) errors and (N,) errors over covariances of measured
-    markers."""
-
-    visible: int
-    reported: int
-    wrong: int
-    error_px: NDArray[np.float64]
-    d2: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Figures:
-    """Of one suite: pictures that gave no marker, the share of visible markers with a position, wrong ones, the RMS per
-    axis of measured markers, px, and z."""
-
-    unread: int
-    reported: float
-    wrong: int
-    rms_px: float
-    z: float
-
-
-def scene_picture(number: int, seed: int, code: int) -> Picture:
+def scene_picture(number: int, seed: int, code: int) -> CameraPicture:
     """The scenes of ``benchmarks.accuracy``."""
     pattern, kind = PATTERNS[number % len(PATTERNS)], SCENE_KINDS[number // len(PATTERNS) % len(SCENE_KINDS)]
-    layout = standard_layout(pattern, STANDARD_LAYERS, code)
-    shot = render(replace(SceneCase(pattern, kind).scene(layout), seed=seed + number), size=STANDARD_SIZE)
-    return Picture(shot.image, layout, shot.truth.marker_xy_px, shot.truth.visible)
+    scene = SceneCase(pattern, kind).scene(standard_layout(pattern, STANDARD_LAYERS, code))
+    return _frame_picture(PatternFrame(replace(scene, seed=seed + number)))
 
 
-def damaged_picture(number: int, seed: int, code: int) -> Picture:
+def damaged_picture(number: int, seed: int, code: int) -> CameraPicture:
     """The random damage of ``benchmarks.damage``."""
     layout = standard_layout(PATTERNS[number % len(PATTERNS)], STANDARD_LAYERS, code)
     frame = PatternFrame(standard_scene(layout, seed=seed + number), STANDARD_SIZE)
     changed = RANDOM_KINDS[number % len(RANDOM_KINDS)].change(frame, 0)
-    shot = changed.shoot()
-    return Picture(shot.image, layout, shot.truths[0].marker_xy_px, shot.truths[0].visible)
+    assert isinstance(changed, PatternFrame)
+    return _frame_picture(changed)
 
 
-def camera_picture(number: int, seed: int, code: int) -> Picture:
+def camera_picture(number: int, seed: int, code: int) -> CameraPicture:
     """The cameras, lamps and inks of ``benchmarks.camera``."""
-    chain = sample_chain(make_cases(number + 1, seed)[number])
-    shot = shoot(replace(chain, pose=replace(chain.pose, code=code)))
-    return Picture(shot.image, shot.layout, shot.marker_xy_px, shot.visible)
+    chain = sample_chain(CameraCase(seed, number))
+    return shoot(replace(chain, pose=replace(chain.pose, code=code)))
 
 
-SUITES: dict[str, Callable[[int, int, int], Picture]] = {
+SUITES: dict[str, Callable[[int, int, int], CameraPicture]] = {
     "flat and bent": scene_picture,
     "random damage": damaged_picture,
     "cameras": camera_picture,
 }
 
 
-@cache
-def _reader(pattern: str, layers: int, code: int) -> Extractor:
-    return Extractor(parse_layout(layout_to_json(standard_layout(pattern, layers, code))))
-
-
-def read_picture(number: int, suite: str, seed: int, code: int) -> PictureCounts:
+def read_picture(number: int, suite: str, seed: int, code: int) -> PictureResult:
     """Draw and read one picture."""
     picture = SUITES[suite](number, seed, code)
-    layout, true_px = picture.layout, picture.marker_xy_px
-    markers = _reader(layout.pattern, int(layout.marker_layer.max()), code).extract(picture.image)
-    error_px = markers.xy_px - true_px
-    reported = np.isfinite(markers.xy_px).all(axis=1)
-    wrong = reported & ~(np.linalg.norm(error_px, axis=1) <= WRONG_SHARE * shortest_edges(layout, true_px))
-    measured = (markers.status == Status.MEASURED) & picture.visible & ~wrong
-    return PictureCounts(
-        visible=int(picture.visible.sum()),
-        reported=int((reported & picture.visible).sum()),
-        wrong=int(wrong.sum()),
-        error_px=error_px[measured],
-        d2=squared_distances(error_px[measured], markers.cov_px2[measured]),
-    )
+    layout = picture.layout
+    reader = cached_extractor(layout.pattern, int(layout.marker_layer.max()), "balanced", code)
+    return score_picture(CameraCase(seed, number), picture, reader.extract(picture.image))
 
 
-def figures_of(suite: str, code: int, pictures: int, seed: int, processes: int) -> Figures:
-    """The figures of one suite, of pads with a code, or plain ones (0)."""
-    read = results_of(partial(read_picture, suite=suite, seed=seed, code=code), range(pictures), processes)
-    errors = np.concatenate([one.error_px for one in read])
-    return Figures(
-        unread=sum(one.reported == 0 for one in read),
-        reported=sum(one.reported for one in read) / max(sum(one.visible for one in read), 1),
-        wrong=sum(one.wrong for one in read),
-        rms_px=float(np.sqrt(np.mean(errors**2))),
-        z=summarise([one.d2 for one in read]).z.value,
-    )
+def beside_table(pictures: int, seed: int, processes: int) -> Table:
+    """A row for the coded pads of each suite, and one for the plain ones."""
+    groups: dict[str, Sequence[PictureResult]] = {}
+    for suite in SUITES:
+        for name, code in (("coded", CODE), ("plain", 0)):
+            read = partial(read_picture, suite=suite, seed=seed, code=code)
+            groups[f"{suite}, {name}"] = results_of(read, range(pictures), processes)
+    return pooled_table("coded pads and plain ones", "pads", COLUMNS, groups)

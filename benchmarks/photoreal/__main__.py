@@ -11,21 +11,18 @@ the plane at half the height, against the plane of the black, and against that w
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from benchmarks.frame.experiment import Experiment, Found, OptionError, Shown
 from benchmarks.frame.parallel import PROCESSES, results_of
+from benchmarks.frame.pooled import Columns, grouped, percentile, pooled_table, reasons, share, total
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.photoreal.page import page
 from benchmarks.suites.photoreal.pictures import (
-    NO_PATTERN,
     PICTURES_FOLDER,
     TracedPicture,
     first_of_families,
@@ -36,44 +33,30 @@ from benchmarks.suites.scoring.calibration import Calibration, calibration_table
 from extractor.presets import Preset
 
 POOLS = {"A to H, O": "ABCDEFGHO", "A to H": "ABCDEFGH", "I, L": "IL", "all but N": "ABCDEFGHOIL"}
-COLUMNS = {
-    "family": TEXT, "pictures": "d", "read": "d", "visible": "d", "measured": ".1%", "ids": "d", "places": "d",
-    "invented": "d", "right reasons": "d", "p50 ms": ".1f", "max ms": ".1f", "reasons": TEXT,
-}  # fmt: skip
+COLUMNS: Columns = {
+    "pictures": ("d", len),
+    "read": ("d", total("is_read")),
+    "visible": ("d", total("visible")),
+    "measured": (".1%", share("measured", "visible")),
+    "ids": ("d", total("wrong_ids")),
+    "places": ("d", total("wrong_places")),
+    "invented": ("d", total("invented")),
+    "right reasons": ("d", total("is_reason_right")),
+    "p50 ms": (".1f", percentile("ms", 50)),
+    "max ms": (".1f", percentile("ms", 100)),
+    "reasons": (TEXT, reasons),
+}
 RUNS = 2  # readings of a picture; the first one may load modules
 
 
-def family_row(name: str, results: Sequence[TracedResult]) -> tuple[object, ...]:
-    """The row of some pictures; at least one."""
-    times_ms, visible = [result.ms for result in results], sum(result.visible for result in results)
-    reasons = sorted(Counter(result.reason for result in results if result.reason).items())
-    return (
-        name,
-        len(results),
-        sum(result.is_read for result in results),
-        visible,
-        sum(result.measured for result in results) / visible if visible else None,
-        sum(result.wrong_ids for result in results),
-        sum(result.wrong_places for result in results),
-        sum(result.reported for result in results if result.picture.family == NO_PATTERN),
-        sum(result.is_reason_right for result in results),
-        float(np.median(times_ms)),
-        max(times_ms),
-        ", ".join(f"{reason} {count}" for reason, count in reasons),
-    )
-
-
-def family_rows(results: Sequence[TracedResult]) -> list[tuple[object, ...]]:
+def families_table(results: Sequence[TracedResult]) -> Table:
     """A row for each family that has pictures, then the pools."""
-    by_family: dict[str, list[TracedResult]] = {}
-    for result in results:
-        by_family.setdefault(result.picture.family, []).append(result)
-    rows = [family_row(name, by_family[name]) for name in sorted(by_family)]
-    for name, families in POOLS.items():
-        pooled = [result for result in results if result.picture.family in families]
-        if pooled:
-            rows.append(family_row(name, pooled))
-    return rows
+    by_family = grouped(sorted(results, key=lambda result: result.picture.family), "picture.family")
+    pools = {
+        name: [result for result in results if result.picture.family in families]
+        for name, families in POOLS.items()
+    }
+    return pooled_table("path-traced pictures", "family", COLUMNS, {**by_family, **pools})
 
 
 def calibrations(results: Sequence[TracedResult]) -> dict[str, Calibration]:
@@ -102,27 +85,18 @@ def picture_line(result: TracedResult) -> str:
 def tables(results: Sequence[TracedResult]) -> list[Table]:
     """Families and pools, then errors over covariances of measured markers."""
     return [
-        Table("path-traced pictures", COLUMNS, family_rows(results)),
+        families_table(results),
         calibration_table("measured markers", calibrations(results)),
     ]
 
 
 def measured_record(results: Sequence[TracedResult]) -> dict[str, Any]:
     """What docs/measured holds."""
-    kept = (
-        "visible",
-        "measured",
-        "reported",
-        "wrong_ids",
-        "wrong_places",
-        "unmeasured",
-        "reason",
-        "is_reason_right",
-        "ms",
-    )
+    kept = ("visible", "measured", "reported", "wrong_ids", "wrong_places", "unmeasured", "reason")
+    kept += ("is_reason_right", "ms")
     return {
         "table": "\n\n".join(map(str, tables(results))),
-        "rows": Table("", COLUMNS, family_rows(results)).records(),
+        "rows": families_table(results).records(),
         "calibration": {place: asdict(found) for place, found in calibrations(results).items()},
         "pictures": [
             {"name": result.picture.name, **{name: getattr(result, name) for name in kept}}
@@ -164,8 +138,7 @@ def measure(
     if each:
         yield from map(picture_line, results)
     yield from tables(results)
-    invented = any(result.reported for result in results if result.picture.family == NO_PATTERN)
-    return Found(measured_record(results), invented or any(result.wrong_ids for result in results))
+    return Found(measured_record(results), any(result.invented or result.wrong_ids for result in results))
 
 
 main = Experiment("photoreal", measure, page)

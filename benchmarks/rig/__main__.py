@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.scenes import standard_layout
 from cmpdesign.calibration.rig.calibration import calibrate_rig_markers
@@ -151,12 +152,9 @@ def measure(sensors: int = 60, seed: int = 0) -> Shown:
                 pooled[known].append((error, stated))
         for known, pairs in pooled.items():
             error, stated = np.array(pairs).T
-            rms = float(np.sqrt(np.mean(error**2)))
-            below, deviation = np.quantile(np.abs(error), 0.95), np.sqrt(np.mean(stated**2))
-            z = float(np.sqrt(np.mean((error / stated) ** 2)))
-            rows.append(
-                (known, distance_mm, 100 * rms, 100 * below, 100 * deviation, 1e3 * rms * PRESS_MM, z)
-            )
+            rms, below = rms_of(error), np.quantile(np.abs(error), 0.95)
+            shares = 100 * rms, 100 * below, 100 * rms_of(stated)
+            rows.append((known, distance_mm, *shares, 1e3 * rms * PRESS_MM, rms_of(error / stated)))
     columns = {"known": TEXT, "from mm": ".0f", "RMS %": ".2f", "95 % below": ".2f", "stated %": ".2f"}
     yield Table(f"depth, {sensors} sensors for each distance", columns | {"RMS um": ".1f", "z": ".2f"}, rows)
 

@@ -10,9 +10,9 @@ from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.parallel import PROCESSES, results_of
 from benchmarks.suites.scoring.calibration import calibration_table
 from benchmarks.suites.scoring.reading import CaseResult, read_case
-from benchmarks.suites.scoring.report import condition_rows, failure_lines, results_table, summary_text
+from benchmarks.suites.scoring.report import by_condition, failure_lines, results_table, summary_text
 from benchmarks.suites.scoring.squares import calibrations_by_position
-from benchmarks.suites.stress.conditions import BY_NAME, KINDS, make_cases
+from benchmarks.suites.stress.conditions import BY_NAME, make_cases
 from benchmarks.suites.stress.kinds import StressCase
 
 # per image, and per image of conditions with many images; a median of five errs by 0.03
@@ -36,12 +36,12 @@ def measure(quick: bool = False, processes: int = PROCESSES) -> Shown:
     # large images first
     jobs.sort(key=lambda job: BY_NAME[job[0].kind].group != "view")
     results = results_of(read_job, jobs, processes, chunk=1)
-    rows = condition_rows(results, KINDS)
-    yield results_table(rows)
-    yield from failure_lines(rows)
+    conditions = by_condition(results)
+    yield results_table(conditions)
+    yield from failure_lines(conditions)
     yield calibration_table("all images", calibrations_by_position([result.squares for result in results]))
-    yield f"{summary_text(rows)}; {len(BY_NAME)} kinds"
-    return Found(failed=any(row.wrong or row.raised for row in rows))
+    yield f"{summary_text(conditions)}; {len(BY_NAME)} kinds"
+    return Found(failed=any(result.score.wrong or result.raised for result in results))
 
 
 main = Experiment("stress", measure)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.special import ndtr
 
+from benchmarks.frame.pooled import rms_of
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK
 from cmpdesign.scene import Optics, Scene, Sensor, render
@@ -167,9 +168,9 @@ def measure_render_error(
     return RenderError(
         name,
         blur_px,
-        grey_rms=float(np.sqrt((difference**2).mean())),
+        grey_rms=rms_of(difference),
         grey_largest=float(np.abs(difference).max()),
-        edge_rms_px=float(np.sqrt((shifts**2).mean())),
+        edge_rms_px=rms_of(shifts),
         edge_largest_px=float(np.abs(shifts).max()),
         edges=len(shifts),
     )

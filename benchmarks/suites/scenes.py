@@ -113,12 +113,12 @@ def inner_markers(layout: Layout) -> NDArray[np.bool_]:
 
 
 def shortest_edges(layout: Layout, true_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(M,) px: the shortest edge at each marker."""
+    """(M,) px: the shortest edge at each marker; to places that are not known, NaN, there is none."""
     ends = true_px[layout.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     shortest = np.full(len(true_px), np.inf)
     for side in (0, 1):
-        np.minimum.at(shortest, layout.edges[:, side], length)
+        np.fmin.at(shortest, layout.edges[:, side], length)
     return shortest
 
 

@@ -8,33 +8,27 @@ raised from 0 to 90 of 255; exposure from 0.3 to 3. A reader that depends on lig
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.parallel import PROCESSES, results_of
+from benchmarks.frame.pooled import Columns, counted, grouped, pooled_table, share, total
 from benchmarks.frame.table import TEXT, Table
-from benchmarks.suites.sweeps.lines import BLACKS, EXPOSURES, LAMPS, SEEDS, LineResult, make_lines, read_line
+from benchmarks.suites.sweeps.lines import SEEDS, LineResult, make_lines, read_line
 
-COLUMNS = {
-    "line": TEXT,
-    "steps": "d",
-    "read": "d",
-    "between": "d",
-    "one in": ".0f",
-    "ids": "d",
-    "reasons": TEXT,
+COLUMNS: Columns = {
+    "steps": ("d", total("steps")),
+    "read": ("d", total("read")),
+    "between": ("d", total("between")),
+    "one in": (".0f", share("steps", "between")),
+    "ids": ("d", total("wrong_ids")),
+    "reasons": (TEXT, lambda results: counted(word for result in results for word in result.reasons)),
 }
 
 
-def kind_row(name: str, results: Sequence[LineResult]) -> tuple[object, ...]:
-    """The lines of a kind: steps, read ones, refused ones between two read ones, wrong ids."""
-    reasons = Counter(reason for result in results for reason in result.reasons)
-    read, steps = reasons.pop("", 0), sum(len(result.reasons) for result in results)
-    between = sum(result.between for result in results)
-    refused = ", ".join(f"{reason} {count}" for reason, count in sorted(reasons.items()))
-    wrong = sum(result.wrong_ids for result in results)
-    return name, steps, read, between, steps / between if between else None, wrong, refused
+def lines_table(results: Sequence[LineResult]) -> Table:
+    """The lines of each kind: steps, read ones, refused ones between two read ones, wrong ids."""
+    return pooled_table("sweeps", "line", COLUMNS, {**grouped(results, "line.kind"), "together": results})
 
 
 def broken_line(result: LineResult) -> str:
@@ -51,11 +45,7 @@ def measure(quick: bool = False, processes: int = PROCESSES) -> Shown:
         quick: lines of one seed.
     """
     results = results_of(read_line, make_lines(1 if quick else SEEDS), processes, chunk=1)
-    rows = [
-        kind_row(kind, [result for result in results if result.line.kind == kind])
-        for kind in (LAMPS, BLACKS, EXPOSURES)
-    ]
-    yield Table("sweeps", COLUMNS, [*rows, kind_row("together", results)])
+    yield lines_table(results)
     yield from (broken_line(result) for result in results if result.between)
     return Found(failed=any(result.wrong_ids for result in results))
 

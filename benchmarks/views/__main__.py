@@ -8,46 +8,41 @@ or more is visible; else nothing but a guess could number them.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-
 from benchmarks.frame.experiment import COMMIT, Experiment, Found, Shown
 from benchmarks.frame.parallel import PROCESSES, results_of
-from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.pooled import Columns, mean, pooled_table, reasons, total
+from benchmarks.frame.table import TEXT
 from benchmarks.suites.views.views import KINDS, DrawnView, ViewResult, read_view
 
-COLUMNS = {
-    "views": TEXT, "count": "d", "share": ".1%", "read": "d", "read share": ".1%", "wrong ids": "d",
-    "wrong views": "d", "reasons": TEXT,
-}  # fmt: skip
 
-
-def kind_row(name: str, results: Sequence[ViewResult], of: int) -> tuple[object, ...]:
-    """Views of one kind: how many of all, read ones, wrong ids, and views with wrong ids."""
-    read = sum(result.reported > 0 for result in results)
-    reasons = Counter(result.reason for result in results if result.reason)
-    told = ", ".join(f"{reason} {count}" for reason, count in sorted(reasons.items()))
-    read_share = read / len(results) if results else None
-    ids = [result.wrong_ids for result in results]
-    return name, len(results), len(results) / of, read, read_share, sum(ids), sum(map(bool, ids)), told
+def columns(views: int) -> Columns:
+    """Of some of a number of views of a kind: how many, read ones, wrong ids, and views with wrong ids."""
+    return {
+        "count": ("d", len),
+        "share": (".1%", lambda results: len(results) / views),
+        "read": ("d", total("is_read")),
+        "read share": (".1%", mean("is_read")),
+        "wrong ids": ("d", total("wrong_ids")),
+        "wrong views": ("d", lambda results: sum(result.wrong_ids > 0 for result in results)),
+        "reasons": (TEXT, reasons),
+    }
 
 
 def measure(views: int = 300, seed: int = COMMIT, processes: int = PROCESSES) -> Shown:
-    """Three rows for each kind of view; fails if an id is wrong.
+    """Up to three rows for each kind of view; fails if an id is wrong.
 
     Args:
         views: of each kind.
     """
     drawn = [DrawnView(kind, seed, number) for kind in KINDS for number in range(views)]
-    results, rows = results_of(read_view, drawn, processes), []
-    for kind in KINDS:
-        of_kind = [result for result in results if result.view.kind == kind]
-        one = [result for result in of_kind if result.motions == 1]
-        parts = [r for r in of_kind if r.motions != 1 and r.motions_of_parts == 1]
-        several = [r for r in of_kind if r.motions != 1 and r.motions_of_parts != 1]
-        for name, chosen in (("one motion", one), ("one by cut cells", parts), ("several", several)):
-            rows.append(kind_row(f"{kind}, {name}", chosen, views))
-    yield Table("views", COLUMNS, rows)
+    results = results_of(read_view, drawn, processes)
+    groups: dict[str, list[ViewResult]] = {
+        f"{kind}, {name}": [] for kind in KINDS for name in ("one motion", "one by cut cells", "several")
+    }
+    for result in results:
+        cut = "one by cut cells" if result.motions_of_parts == 1 else "several"
+        groups[f"{result.view.kind}, {'one motion' if result.motions == 1 else cut}"].append(result)
+    yield pooled_table("views", "views", columns(views), groups)
     for result in results:
         if result.wrong_ids:
             of = f"{result.wrong_ids} wrong ids, {result.motions} motions"

@@ -11,13 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.ablation.__main__ import comparison_line, main, try_rules
-from benchmarks.ablation.report import merged_rows
+from benchmarks.ablation.__main__ import main, try_rules
+from benchmarks.ablation.report import comparison_row, merged_rows, rules_table
 from benchmarks.suites.ablation.comparison import MIN_LOSS, compare
 from benchmarks.suites.ablation.pictures import PatternTruth, keep_pictures, pattern_truth, sampled_cases
 from benchmarks.suites.ablation.provoking import CHANGES, FOREIGN, provoking_cases
-from benchmarks.suites.ablation.rule import Rule
-from benchmarks.suites.ablation.rules import RULES
+from benchmarks.suites.ablation.rules import RULES, Rule
 from benchmarks.suites.ablation.trial import PictureScore, read_without, score_reading
 from benchmarks.suites.ablation.worker import ReadPicture
 from benchmarks.suites.code_copy import ROOT, CodeCopy, Replacement, replaced_text
@@ -97,7 +96,8 @@ def test_a_rule_that_does_nothing_makes_no_difference_and_one_that_breaks_readin
     visible = sum(int(picture.truths[0].visible.sum()) for picture in pictures)
     assert nothing.rms_px.full > 0 and nothing.lost.full < 0.01 * visible
     assert reading.touched == 2 and reading.lost.without == visible and reading.verdict == "keep"
-    assert "keep" in comparison_line(reading) and "goes" in comparison_line(nothing)
+    table = rules_table([{**comparison_row(one), "seed": 1} for one in (nothing, reading)])
+    assert [row["by the figures"] for row in table.records()] == ["goes", "keep"]
 
 
 def test_a_reader_that_does_not_start_is_an_error_and_no_score(tmp_path: Path, copy: CodeCopy) -> None:

@@ -15,9 +15,14 @@ from benchmarks.extraction import fit_exponent, image_size_px
 from benchmarks.frame.published import replace_blocks
 from benchmarks.suites.article.corners import fit_plain_triangles
 from benchmarks.suites.article.regions import InkRegions
-from benchmarks.suites.comparison.measure import CASES, measure_case, point_errors
+from benchmarks.suites.comparison.measure import (
+    CASES,
+    measure_case,
+    measure_pooled,
+    point_errors,
+    pooled_cases,
+)
 from benchmarks.suites.comparison.methods import METHODS, REFERENCE_METHOD
-from benchmarks.suites.comparison.pooled import measure_pooled, pooled_cases
 from benchmarks.suites.comparison.report import (
     MARKS,
     comparison_picture,

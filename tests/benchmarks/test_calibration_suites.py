@@ -14,7 +14,7 @@ from benchmarks.frame.conditions import commit_seed
 from benchmarks.frame.parallel import results_of
 from benchmarks.suites.calibration.damaged import DAMAGE_KINDS, MILD_KINDS
 from benchmarks.suites.calibration.plain import scattered_layout
-from benchmarks.suites.calibration.reading import SuiteJob, calibration_rows, in_order, read_pictures
+from benchmarks.suites.calibration.reading import SuiteJob, calibrations_by_suite, in_order, read_pictures
 from benchmarks.suites.calibration.suites import suites_by_name, usual_seed
 from benchmarks.suites.camera.cases import KINDS
 from benchmarks.suites.scoring.squares import POSITIONS, nearest_truth, picture_squares
@@ -86,13 +86,10 @@ def test_parts_of_a_suite_are_the_suite() -> None:
         read_pictures(SuiteJob("scatter", ("balanced",), True)),
     )
     assert [reading.number for reading in apart] == [reading.number for reading in whole] == list(range(9))
-    assert calibration_rows(apart) == calibration_rows(whole)
-    rows = calibration_rows(whole)
-    together = [
-        row.calibration.count for row in rows if (row.kind, row.positions) == ("together", "measured")
-    ]
-    kinds = [row.calibration.count for row in rows if row.kind.endswith("px") and row.positions == "measured"]
-    assert len(kinds) == 3 and together == [sum(kinds)]
+    found = calibrations_by_suite(whole)["balanced, scatter"]
+    assert calibrations_by_suite(apart)["balanced, scatter"] == found
+    kinds = [one.count for name, one in found.items() if name.endswith("px: measured")]
+    assert len(kinds) == 3 and found["together: measured"].count == sum(kinds)
 
 
 def test_the_camera_suite_has_all_effects_and_the_commits_seed() -> None:

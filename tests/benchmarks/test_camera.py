@@ -210,7 +210,7 @@ def test_wrong_ids_wrong_positions_and_exceptions_are_counted_apart(tmp_path: Pa
     picture = shoot(chain)
     found = cached_extractor("honeycomb", 4, "balanced").extract(picture.image)
     exact = replace(found, xy_px=picture.marker_xy_px.copy())
-    good = score_picture(case, 20.0, picture, exact, 1.0)
+    good = score_picture(case, picture, exact, 1.0)
     assert good.measured == good.right == good.visible == len(good.d2) and good.rms_px == 0
     moved = picture.marker_xy_px.copy()
     moved[[7, 8]] = moved[[8, 7]]
@@ -220,14 +220,14 @@ def test_wrong_ids_wrong_positions_and_exceptions_are_counted_apart(tmp_path: Pa
     outcome = marker_outcomes(picture, bad)
     assert list(np.flatnonzero(outcome == WRONG_ID)) == [7, 8]
     assert list(np.flatnonzero(outcome == WRONG_PLACE)) == [5]
-    result = score_picture(case, 20.0, picture, bad, 2.0)
+    result = score_picture(case, picture, bad, 2.0)
     assert (result.wrong_ids, result.wrong_places, result.right) == (2, 1, good.right - 3)
     assert result.rms_px == pytest.approx(np.sqrt(0.25 / (2 * result.right)))
-    table = effects_table([good, result, raised_result(CameraCase(SEED, 1), 20.0, picture, "Oops()")])
+    table = effects_table([good, result, raised_result(CameraCase(SEED, 1), picture, "Oops()")])
     row = table.records()[-1]
     assert [row[name] for name in ("pictures", "unread", "raised", "ids")] == [3, 1, 1, 2]
     assert row["reasons"] == "Oops() 1" and row["p99 ms"] == pytest.approx(2.0, abs=0.02)
-    lines = failure_lines([good, result, raised_result(case, 20.0, picture, "Oops()")])
+    lines = failure_lines([good, result, raised_result(case, picture, "Oops()")])
     assert [line.split()[0] for line in lines] == ["RAISED", "WRONG"]
 
     shown = shown_results([good, result])

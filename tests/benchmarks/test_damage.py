@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from benchmarks.damage import (
-    DamageResult,
     case_name,
-    count_swapped_markers,
     main,
     parse_case,
     sample_cases,
-    totals_by_kind,
+    totals_table,
     wrong_lines,
 )
 from benchmarks.suites.scoring.reading import cached_extractor, read_case
+from benchmarks.suites.scoring.score import score_markers
 from benchmarks.suites.stress.conditions import BY_NAME
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame, plain_frame
 from benchmarks.suites.stress.kinds import make_frame
@@ -102,28 +101,29 @@ def test_markers_taken_for_others_are_told_from_moved_ones() -> None:
     shot = plain_frame("honeycomb", 0).shoot()
     found = cached_extractor("honeycomb", 11).extract(shot.image)
     true_px = shot.truths[0].marker_xy_px.copy()
-    assert count_swapped_markers(shot, replace(found, xy_px=true_px)) == 0
+
+    def others(xy_px: np.ndarray) -> int:
+        return score_markers(replace(found, xy_px=xy_px), shot, promised=False).others
+
+    assert others(true_px) == 0
     moved = true_px.copy()
     moved[5] += [8.0, 0.0]  # of 20
-    assert count_swapped_markers(shot, replace(found, xy_px=moved)) == 0
+    assert others(moved) == 0
     moved[[7, 8]] = moved[[8, 7]]
-    assert count_swapped_markers(shot, replace(found, xy_px=moved)) == 2
+    assert others(moved) == 2
 
 
 def test_totals_name_the_images_with_wrong_markers() -> None:
     case = sample_cases(1, 11)[0]
     result = read_case(case, 1, timing=False)[0]
-    bad = replace(result, score=replace(result.score, wrong=3))
-    rows = totals_by_kind([DamageResult(result, 0), DamageResult(bad, 2)])
-    assert [row.kind for row in rows] == [case.kind, "together"]
-    assert (rows[-1].images, rows[-1].wrong, rows[-1].others) == (2, 3, 2)
-    assert rows[-1].kept == 2 * result.score.kept
-    assert wrong_lines(rows[-1]) == [f"WRONG    3  {case_name(case)}"]
-    silent = replace(result, reason="reference_lost")
-    assert (
-        totals_by_kind([DamageResult(silent, 0)])[-1].unread == 1
-        and totals_by_kind([DamageResult(silent, 0)])[-1].sure == 0
-    )
+    bad = replace(result, score=replace(result.score, wrong=3, others=2))
+    rows = totals_table([result, bad]).records()
+    assert [row["kind"] for row in rows] == [case.kind, "together"]
+    assert (rows[-1]["images"], rows[-1]["wrong"], rows[-1]["ids"]) == (2, 3, 2)
+    assert rows[-1]["sure"] == 2 * result.score.sure
+    assert wrong_lines([result, bad]) == [f"WRONG    3  {case_name(case)}"]
+    silent = totals_table([replace(result, reason="reference_lost")]).records()[-1]
+    assert silent["unread"] == 1 and silent["sure"] == 0
 
 
 def test_a_run_prints_and_writes_and_one_image_is_saved(

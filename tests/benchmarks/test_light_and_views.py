@@ -34,7 +34,7 @@ from benchmarks.suites.views.views import (
     seen_cells,
     up_cells,
 )
-from benchmarks.sweeps.__main__ import kind_row
+from benchmarks.sweeps.__main__ import lines_table
 
 
 def test_daylight_shows_the_inks_as_they_are() -> None:
@@ -68,7 +68,7 @@ def test_steps_between_read_ones_are_counted() -> None:
 
     assert [between(steps) for steps in ("...", "xx..x", ".x.xx.", "xxx", "x.x")] == [0, 0, 3, 0, 0]
     broken = LineResult(Line(LAMPS, 0, 0), ("", "no_color", ""), 2)
-    assert kind_row("lamps", [broken]) == ("lamps", 3, 2, 1, 3.0, 2, "no_color 1")
+    assert lines_table([broken]).rows[0] == ("lamps", 3, 2, 1, 3.0, 2, "no_color 1")
 
 
 @settings(max_examples=25)

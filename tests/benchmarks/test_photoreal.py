@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.photoreal.__main__ import family_rows, main, measured_record
+from benchmarks.photoreal.__main__ import families_table, main, measured_record
 from benchmarks.photoreal.page import IMAGE, page
 from benchmarks.suites.photoreal.pictures import (
     NO_PATTERN,
@@ -17,7 +17,8 @@ from benchmarks.suites.photoreal.pictures import (
     first_of_families,
     load_pictures,
 )
-from benchmarks.suites.photoreal.reading import is_reason_right, read_picture, reference_of, wrong_markers
+from benchmarks.suites.photoreal.reading import WRONG_SHARE, is_reason_right, read_picture, reference_of
+from benchmarks.suites.scoring.wrong import wrong_markers
 from extractor import Extractor, Markers, Reason, Status
 
 PICTURES = load_pictures(PICTURES_FOLDER)
@@ -57,11 +58,13 @@ def test_wrong_ids_and_wrong_positions_are_counted_apart() -> None:
     xy_px[[3, 4]] = xy_px[[4, 3]]  # each at the other's place
     xy_px[168] += 0.8 * (xy_px[168] - xy_px[0]) / 7  # beyond the rim
     status = np.full_like(found.status, Status.MEASURED)
-    ids, places = wrong_markers(replace(found, xy_px=xy_px, status=status), truth)
+    tolerance_px = WRONG_SHARE * truth.edge_px
+    moved = replace(found, xy_px=xy_px, status=status)
+    ids, places = wrong_markers(moved, truth.xy_px, tolerance_px)
     assert np.flatnonzero(ids).tolist() == [3, 4]
     assert np.flatnonzero(places).tolist() == [168]
     status[[3, 168]] = Status.LOST
-    ids, places = wrong_markers(replace(found, xy_px=xy_px, status=status), truth)
+    ids, places = wrong_markers(replace(moved, status=status), truth.xy_px, tolerance_px)
     assert (np.flatnonzero(ids).tolist(), places.any()) == ([4], False)
 
 
@@ -86,8 +89,8 @@ def test_a_reason_is_compared_with_the_truth() -> None:
 
 def test_a_folder_without_a_family_has_no_row_of_it(capsys: pytest.CaptureFixture[str]) -> None:
     results = [read_picture(BY_NAME["G00_ball"]), read_picture(BY_NAME["N00_random_triangles"])]
-    assert [row[0] for row in family_rows(results)] == ["G", "N", "A to H, O", "A to H", "all but N"]
-    assert [row[0] for row in family_rows(results[1:])] == ["N"]
+    assert [row[0] for row in families_table(results).rows] == ["G", "N", "A to H, O", "A to H", "all but N"]
+    assert [row[0] for row in families_table(results[1:]).rows] == ["N"]
     found = page(measured_record(results))
     assert "G                 1     1" in found.blocks["photoreal"]
     assert found.pictures[IMAGE][:2] == b"\xff\xd8"

@@ -15,12 +15,12 @@ from benchmarks.suites.scoring.calibration import calibration_table
 from benchmarks.suites.scoring.reading import CaseResult, cached_extractor, read_case
 from benchmarks.suites.scoring.report import (
     PROMISED_SHARE,
-    condition_rows,
+    by_condition,
     failure_lines,
     results_table,
 )
 from benchmarks.suites.scoring.score import score_markers, smallest_contrast
-from benchmarks.suites.scoring.squares import calibrations_by_position
+from benchmarks.suites.scoring.squares import MEASURED, calibrations_by_position
 from benchmarks.suites.stress.conditions import BY_NAME, KINDS, make_cases
 from benchmarks.suites.stress.frames import PATTERNS, CaseImage, plain_frame
 from benchmarks.suites.stress.kinds import ConditionKind, StressCase, make_frame
@@ -129,19 +129,18 @@ def test_markers_on_an_empty_image_are_wrong_and_reported_as_such() -> None:
     figures = score_markers(markers, CaseImage(shot.image, (), None), promised=False)
     assert figures.wrong == figures.reported == int((markers.status > 0).sum())
     case = StressCase("nothing: noise", 1, "honeycomb", 0)
-    rows = condition_rows([CaseResult(case, figures, 10.0, 1.0, "", False)], KINDS)
-    assert failure_lines(rows)[0].startswith("WRONG")
+    conditions = by_condition([CaseResult(case, figures, 10.0, 1.0, "", False)])
+    assert failure_lines(conditions)[0].startswith("WRONG")
 
 
 def test_errors_over_covariances_are_stated() -> None:
     """Of a condition with a pattern in a row and a table; of one without, none."""
     cases = [StressCase("plain", 0, "honeycomb", 0), StressCase("nothing: noise", 1, "honeycomb", 0)]
     results = [result_of(case) for case in cases]
-    rows = condition_rows(results, KINDS)
-    assert [row.calibration.count for row in rows] == [results[0].score.measured, 0]
-    shown = results_table(rows).records()
-    assert shown[0]["z"] == rows[0].calibration.z.value and np.isnan(shown[1]["z"])
+    shown = results_table(by_condition(results)).records()
     stated = calibrations_by_position([result.squares for result in results])
+    assert shown[0]["z"] == stated[MEASURED].z.value and np.isnan(shown[1]["z"])
+    assert stated[MEASURED].count == results[0].score.measured
     assert "virtual, measured" in str(calibration_table("", stated))
 
 

@@ -15,9 +15,10 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.suites.calibration.camera import camera_cases
-from benchmarks.suites.calibration.cases import CalibrationPicture
+from benchmarks.suites.calibration.cases import KnownPicture
 from benchmarks.suites.scenes import SCENE_KINDS, SceneCase, cached_extractor, inner_markers
 from benchmarks.suites.scoring.calibration import squared_distances, summarise
+from benchmarks.suites.stress.frames import CaseImage
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.scene import render
 from extractor import Extractor, Reference, Status, VirtualStatus, parse_layout
@@ -140,7 +141,7 @@ def test_the_covariance_of_the_outermost_layer_holds_halos() -> None:
 
 
 @cache
-def pictures_of_cameras() -> list[tuple[Reference, CalibrationPicture]]:
+def pictures_of_cameras() -> list[tuple[Reference, KnownPicture | CaseImage]]:
     """Colors beside each other, aberration, motion, demosaicing, compression: the gridlines at a marker disagree."""
     effects = ("shifted colors", "aberration", "motion", "mosaic", "jpeg")
     cases = islice((case for case in camera_cases(False, 11) if case.kind in effects), 20)

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.ablation.rule import Rule
+from benchmarks.suites.ablation.rules import Rule
 from benchmarks.suites.ablation.trial import PictureScore
 
 MIN_LOSS = 0.02  # by which wrong, lost or RMS must rise without a rule that is kept

@@ -14,7 +14,7 @@ from benchmarks.suites.ablation.provoking import provoking_cases
 from benchmarks.suites.ablation.seen_views import traced_cases, view_cases
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.calibration.suites import suites_by_name
-from benchmarks.suites.scenes import standard_layout
+from benchmarks.suites.scenes import shortest_edges, standard_layout
 from benchmarks.suites.stress.conditions import BY_NAME
 from benchmarks.suites.stress.frames import PATTERNS, PatternFrame
 from benchmarks.suites.stress.kinds import StressCase, make_frame
@@ -121,9 +121,4 @@ def pattern_truth(
         seen[:] = np.all((known_px >= -0.5) & (known_px < np.array(shape[1::-1]) - 0.5), axis=1)
     else:
         seen[:count] = visible[:count]
-    ends = known_px[layout.edges]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    edge_px = np.full(len(known_px), np.inf)
-    for side in (0, 1):
-        np.fmin.at(edge_px, layout.edges[:, side], length)
-    return PatternTruth(known_px, edge_px, seen)
+    return PatternTruth(known_px, shortest_edges(layout, known_px), seen)

@@ -7,18 +7,17 @@ follow each other; twenty pictures hold about a hundred thousand markers, half o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.scenes import standard_layout
 from benchmarks.suites.stress.damage import missing_cell_clusters, white_elsewhere, white_neighbours_missing
 from benchmarks.suites.stress.empty import EMPTY_KINDS
-from benchmarks.suites.stress.frames import PATTERNS, EmptyFrame, PatternFrame, plain_frame
+from benchmarks.suites.stress.frames import PATTERNS, CaseImage, EmptyFrame, PatternFrame, plain_frame
 from benchmarks.suites.stress.random_damage import (
     RANDOM_KINDS,
     sample_deformed,
@@ -27,20 +26,12 @@ from benchmarks.suites.stress.random_damage import (
 )
 from benchmarks.suites.stress.surroundings import other_pattern_name, pattern_behind, second_pattern_beside
 from cmpdesign.patterns.colors import BLACK, WHITE
-from cmpdesign.scene import Scratch, Truth
+from cmpdesign.scene import Scratch
 
 LAYERS, LARGE_LAYERS, LARGE_PITCH_PX = 11, 60, 9.0
 LARGE_SIZE = (1200, 1050)
 SWAPPED_SHARES = (0.02, 0.3)
 Rng = np.random.Generator
-
-
-@dataclass(frozen=True, eq=False)
-class ForeignPicture:
-    """A picture without the reader's pattern: every reported marker has a wrong id."""
-
-    image: NDArray[np.uint8]
-    truths: tuple[Truth, ...] = ()
 
 
 def damaged_at_random(frame: PatternFrame, rng: Rng) -> PatternFrame:
@@ -128,13 +119,13 @@ CHANGES: dict[str, Callable[[PatternFrame, Rng], PatternFrame]] = {
 FOREIGN = "foreign tiling"
 
 
-def shoot_foreign(seed: int, pattern: str) -> ForeignPicture:
+def shoot_foreign(seed: int, pattern: str) -> CaseImage:
     """A tiling that is not the reader's pattern, or a picture without a pattern."""
     rng = np.random.default_rng([seed, 6])
     kind = EMPTY_KINDS[int(rng.integers(len(EMPTY_KINDS)))]
     frame = kind.change(plain_frame(pattern, seed), float(rng.choice(kind.steps)))
     assert isinstance(frame, EmptyFrame)
-    return ForeignPicture(frame.shoot().image)
+    return frame.shoot()
 
 
 def provoking_cases(seed: int) -> Iterator[CalibrationCase]:

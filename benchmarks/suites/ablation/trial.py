@@ -12,16 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.suites.ablation.pictures import KeptPicture, PatternTruth
-from benchmarks.suites.ablation.rule import Rule
+from benchmarks.suites.ablation.rules import Rule
 from benchmarks.suites.ablation.worker import ReadPicture
 from benchmarks.suites.code_copy import CodeCopy, Replacement, environment
 from benchmarks.suites.scoring.calibration import BEYOND_D2, squared_distances
+from benchmarks.suites.scoring.wrong import wrong_markers
 from extractor import Status
 
-WRONG_POSITION, SAME_PLACE = (
-    0.5,
-    0.3,
-)  # in the shortest edges: beyond it a position is wrong; at a marker's place
+# In the shortest edges: beyond the first a position is wrong, up to the second it is at a marker's place.
+WRONG_POSITION, SAME_PLACE = 0.5, 0.3
 
 
 class PictureScore(NamedTuple):
@@ -116,23 +115,17 @@ def score_reading(reading: ReadPicture, truths: Sequence[PatternTruth]) -> Pictu
 
 def _score_pattern(reading: ReadPicture, truth: PatternTruth) -> PictureScore:
     reported = reading.status != Status.LOST
-    error_px = np.linalg.norm(reading.xy_px - truth.xy_px, axis=1)
-    wrong = reported & ~(error_px <= WRONG_POSITION * truth.edge_px)
-    known = np.flatnonzero(np.isfinite(truth.xy_px).all(axis=1))
-    wrong_ids = 0
-    for marker in np.flatnonzero(wrong):
-        distance_px = np.linalg.norm(truth.xy_px[known] - reading.xy_px[marker], axis=1)
-        nearest = known[distance_px.argmin()]
-        wrong_ids += bool(nearest != marker and distance_px.min() < SAME_PLACE * truth.edge_px[nearest])
-    right, measured = reported & ~wrong, (reading.status == Status.MEASURED) & ~wrong
+    wrong = wrong_markers(reading, truth.xy_px, WRONG_POSITION * truth.edge_px, SAME_PLACE * truth.edge_px)
+    right = reported & ~wrong.any_kind
+    measured = right & (reading.status == Status.MEASURED)
     d2 = squared_distances(reading.xy_px[right] - truth.xy_px[right], reading.cov_px2[right])
     return PictureScore(
-        wrong_ids=wrong_ids,
-        wrong_positions=int(wrong.sum()) - wrong_ids,
+        wrong_ids=int(wrong.ids.sum()),
+        wrong_positions=int(wrong.places.sum()),
         lost=int((truth.visible & ~reported).sum()),
         visible=int(truth.visible.sum()),
         measured=int(measured.sum()),
-        squared_px2=float((error_px[measured] ** 2).sum()),
+        squared_px2=float(((reading.xy_px - truth.xy_px)[measured] ** 2).sum()),
         reported=int(right.sum()),
         d2=float(d2[np.isfinite(d2)].sum()),
         beyond=int((d2 > BEYOND_D2).sum()),

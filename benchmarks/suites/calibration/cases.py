@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.suites.scenes import SceneCase, standard_layout
-from benchmarks.suites.scoring.squares import TruePositions
-from benchmarks.suites.stress.frames import PatternFrame
+from benchmarks.suites.stress.frames import CaseImage, PatternFrame
 from cmpdesign.layout.layout import Layout
-
-
-class CalibrationPicture(Protocol):
-    """A picture with known positions, such as ``CaseImage``."""
-
-    @property
-    def image(self) -> NDArray[Any]:
-        """(H, W, 3) BGR, uint8 or uint16."""
-
-    @property
-    def truths(self) -> Sequence[TruePositions]:
-        """One entry for each pattern in the picture, at least one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +48,7 @@ class CalibrationCase:
 
     kind: str
     layout: Layout
-    shoot: Callable[[], CalibrationPicture]
+    shoot: Callable[[], KnownPicture | CaseImage]
 
 
 def random_view(case: SceneCase, rng: np.random.Generator) -> PatternFrame:

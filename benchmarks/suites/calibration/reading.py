@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
 
+from benchmarks.frame.pooled import grouped
 from benchmarks.suites.calibration.suites import suites_by_name
 from benchmarks.suites.scoring.calibration import Calibration
 from benchmarks.suites.scoring.squares import (
@@ -48,17 +49,6 @@ class PictureReading:
     squares: PictureSquares
 
 
-@dataclass(frozen=True)
-class CalibrationRow:
-    """The pictures of one kind, or of a suite together; ``positions`` is one of ``squares.POSITIONS``."""
-
-    preset: Preset
-    suite: str
-    kind: str
-    positions: str
-    calibration: Calibration
-
-
 @lru_cache(maxsize=64)
 def _cached_reader(layout: Layout, preset: Preset) -> Extractor:
     return Extractor(parse_layout(layout_to_json(layout)), preset)
@@ -86,21 +76,17 @@ def in_order(readings_of_jobs: Iterable[Sequence[PictureReading]]) -> list[Pictu
     return sorted(found, key=lambda reading: (suites.index(reading.suite), reading.number))
 
 
-def calibration_rows(readings: Sequence[PictureReading]) -> list[CalibrationRow]:
-    """Rows by preset, suite and kind, of measured markers and virtual markers; of a suite together, of all positions.
-
-    The order of presets, suites and kinds is that of the readings' first entries.
+def calibrations_by_suite(readings: Sequence[PictureReading]) -> dict[str, dict[str, Calibration]]:
+    """By preset and suite, then by kind and positions: of measured markers and virtual markers, of a suite together of
+    all positions. The order of presets, suites and kinds is that of the readings' first entries.
     """
-    rows = []
-    for preset in dict.fromkeys(reading.preset for reading in readings):
-        of_preset = [reading for reading in readings if reading.preset == preset]
-        for suite in dict.fromkeys(reading.suite for reading in of_preset):
-            of_suite = [reading for reading in of_preset if reading.suite == suite]
-            for kind in (*dict.fromkeys(reading.kind for reading in of_suite), TOGETHER):
-                chosen = [reading.squares for reading in of_suite if kind in (reading.kind, TOGETHER)]
-                rows += [
-                    CalibrationRow(preset, suite, kind, positions, found)
-                    for positions, found in calibrations_by_position(chosen).items()
-                    if kind == TOGETHER or positions in (MEASURED, VIRTUAL_MEASURED)
-                ]
-    return rows
+    found: dict[str, dict[str, Calibration]] = {}
+    for preset, of_preset in grouped(readings, "preset").items():
+        for suite, of_suite in grouped(of_preset, "suite").items():
+            found[f"{preset}, {suite}"] = {
+                f"{kind}: {positions}": one
+                for kind, chosen in {**grouped(of_suite, "kind"), TOGETHER: of_suite}.items()
+                for positions, one in calibrations_by_position([read.squares for read in chosen]).items()
+                if kind == TOGETHER or positions in (MEASURED, VIRTUAL_MEASURED)
+            }
+    return found

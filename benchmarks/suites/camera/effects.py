@@ -1,7 +1,7 @@
 """The effects in the order of a camera. Each changes a chain with a strength from 0 (no change) to 1 (the largest).
 
-Directions, signs and kinds are drawn at random. A new effect is one function and one line
-in ``EFFECTS``.
+Directions, signs and kinds are drawn at random. A new effect is one line in ``EFFECTS``, and a function where more than
+a field of ``parts`` changes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SURROUNDS: tuple[tuple[SurroundKind, RGB], ...] = (
     ("skin", (0.52, 0.29, 0.20)),
 )
 WEAKEST_CHANNEL, WEAK_CHANNELS = 0.05, 0.2  # of the light of the strongest channel
-MAX_LIFTED = 0.22  # of the largest light
+MAX_LIFTED = 0.22  # of the largest light: to 130 of 255
 SHARP_BLUR_PX, SOFT_BLUR_PX = 0.5, 1.1  # of the lens before a mosaic: a sharp one shows false colors
 
 
@@ -134,51 +134,14 @@ def change_surround(chain: Chain, strength: float, rng: Rng) -> Chain:
     return replace(chain, surround=Surround(kind, _rgb(np.minimum(mixed, 0.95)), strength))
 
 
-def shift_colors(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """The cells of each color shifted separately, by up to 0.1 pitch."""
-    return replace(chain, pad=replace(chain.pad, color_shift=0.1 * strength))
+def graded(part: str, name: str, most: float, *, is_signed: bool = False) -> Effect:
+    """A field of a part of the chain in proportion to the strength; ``is_signed``: of a random sign."""
 
+    def change(chain: Chain, strength: float, rng: Rng) -> Chain:
+        sign = float(rng.choice((-1, 1))) if is_signed else 1.0
+        return replace(chain, **{part: replace(getattr(chain, part), **{name: most * sign * strength})})
 
-def scatter_corners(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Corners of cells scattered by up to 0.5 px."""
-    return replace(chain, pad=replace(chain.pad, corner_scatter_px=0.5 * strength))
-
-
-def round_corners(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Corners of cells rounded with a radius of up to 0.2 edges."""
-    return replace(chain, pad=replace(chain.pad, rounding=0.2 * strength))
-
-
-def bleed_edges(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Sides of cells bled outward by up to 0.1 pitch."""
-    return replace(chain, pad=replace(chain.pad, bleed=0.1 * strength))
-
-
-def defocus(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """A disc of defocus with a radius of up to 4 px."""
-    return replace(chain, lens=replace(chain.lens, defocus_px=4.0 * strength))
-
-
-def aberrate(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Red and blue displaced by up to 2 px in the image's corners, in opposite directions."""
-    sign = float(rng.choice((-1, 1)))
-    return replace(chain, lens=replace(chain.lens, aberration_px=2.0 * sign * strength))
-
-
-def bloom(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Up to a fifth of the light scattered far."""
-    return replace(chain, lens=replace(chain.lens, bloom=0.2 * strength))
-
-
-def vignette(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Corners that lose up to 0.8 of the light."""
-    return replace(chain, lens=replace(chain.lens, vignetting=0.8 * strength))
-
-
-def distort(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Barrel or pincushion distortion of up to 0.15 in the image's corners."""
-    sign = float(rng.choice((-1, 1)))
-    return replace(chain, lens=replace(chain.lens, distortion=0.15 * sign * strength))
+    return change
 
 
 def move(chain: Chain, strength: float, rng: Rng) -> Chain:
@@ -212,30 +175,10 @@ def add_noise(chain: Chain, strength: float, rng: Rng) -> Chain:
     return replace(chain, sensor=replace(sensor, electrons=electrons, read_noise=read_noise))
 
 
-def lift_black(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Black lifted by up to 0.22 of the largest light: to 130 of 255."""
-    return replace(chain, sensor=replace(chain.sensor, lifted_black=MAX_LIFTED * strength))
-
-
 def misbalance(chain: Chain, strength: float, rng: Rng) -> Chain:
     """A white balance whose gains are wrong by factors of up to 1.65 each."""
     error = rng.uniform(-0.5, 0.5, 3) * strength
     return replace(chain, development=replace(chain.development, balance_error=_rgb(error)))
-
-
-def sharpen(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """An unsharp mask of a strength of up to 2."""
-    return replace(chain, development=replace(chain.development, sharpening=2.0 * strength))
-
-
-def map_tones(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """Local tone mapping as of phones, with an exponent of up to 0.5."""
-    return replace(chain, development=replace(chain.development, tone_mapping=0.5 * strength))
-
-
-def add_s_curve(chain: Chain, strength: float, rng: Rng) -> Chain:
-    """An S-shaped tone curve of a strength of up to 1."""
-    return replace(chain, development=replace(chain.development, s_curve=strength))
 
 
 def compress(chain: Chain, strength: float, rng: Rng) -> Chain:
@@ -256,24 +199,24 @@ EFFECTS: dict[str, Effect] = {
     "lamps": change_lamps,
     "colored light": color_light,
     "surround": change_surround,
-    "shifted colors": shift_colors,
-    "scattered corners": scatter_corners,
-    "rounded corners": round_corners,
-    "bled edges": bleed_edges,
-    "defocus": defocus,
-    "aberration": aberrate,
-    "bloom": bloom,
-    "vignetting": vignette,
-    "distortion": distort,
+    "shifted colors": graded("pad", "color_shift", 0.1),
+    "scattered corners": graded("pad", "corner_scatter_px", 0.5),
+    "rounded corners": graded("pad", "rounding", 0.2),
+    "bled edges": graded("pad", "bleed", 0.1),
+    "defocus": graded("lens", "defocus_px", 4.0),
+    "aberration": graded("lens", "aberration_px", 2.0, is_signed=True),
+    "bloom": graded("lens", "bloom", 0.2),
+    "vignetting": graded("lens", "vignetting", 0.8),
+    "distortion": graded("lens", "distortion", 0.15, is_signed=True),
     "motion": move,
     "exposure": change_exposure,
     "mosaic": add_mosaic,
     "noise": add_noise,
-    "lifted black": lift_black,
+    "lifted black": graded("sensor", "lifted_black", MAX_LIFTED),
     "white balance": misbalance,
-    "sharpening": sharpen,
-    "tone mapping": map_tones,
-    "s-curve": add_s_curve,
+    "sharpening": graded("development", "sharpening", 2.0),
+    "tone mapping": graded("development", "tone_mapping", 0.5),
+    "s-curve": graded("development", "s_curve", 1.0),
     "jpeg": compress,
 }
 

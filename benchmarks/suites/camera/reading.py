@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -14,11 +16,13 @@ from benchmarks.suites.camera.shoot import CameraPicture, shoot
 from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges, standard_layout
 from benchmarks.suites.scoring.calibration import squared_distances
 from benchmarks.suites.scoring.contrast import neighbour_contrast
+from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.files.layout_json import layout_to_json
 from extractor import Extractor, Markers, Status, parse_layout
 from extractor.presets import Preset
 
 RUNS = 2  # readings of a picture
+NO_REASON = "no reason given"
 # a marker's outcome as one letter
 UNSEEN, MEASURED, ESTIMATED, LOST, WRONG_PLACE, WRONG_ID = ".merpi"
 
@@ -29,7 +33,6 @@ class PictureResult:
 
     Attributes:
         case: the picture.
-        pitch_px: of its pattern.
         outcomes: one letter for each marker: not visible, measured, repaired or fitted, lost, reported with an error
             above ``WRONG_SHARE`` of the shortest edge, reported at another marker's place. The last two are given to
             markers that are not visible, too.
@@ -38,14 +41,13 @@ class PictureResult:
         right: markers that are visible, measured and not wrong.
         measured: markers that are visible and measured, wrong ones included.
         visible: visible markers.
-        ms: processor time of the faster of two readings; the first one may load modules.
+        ms: processor time of the faster of two readings; the first one may load modules. NaN where not known.
         reason: the extractor's reason, or the text of its exception; empty if there is none.
         contrast: CIE76 of neighbouring cells, see ``neighbour_contrast``.
         raised: the extractor raised an exception.
     """
 
     case: CameraCase
-    pitch_px: float
     outcomes: str
     d2: NDArray[np.float64]
     squared_px2: float
@@ -58,6 +60,16 @@ class PictureResult:
     raised: bool = False
 
     @property
+    def pitch_px(self) -> float:
+        """Of its pattern."""
+        return sample_chain(self.case).pose.pitch_px
+
+    @property
+    def reported(self) -> int:
+        """Visible markers that are not lost."""
+        return self.visible - self.outcomes.count(LOST)
+
+    @property
     def wrong_ids(self) -> int:
         return self.outcomes.count(WRONG_ID)
 
@@ -66,13 +78,24 @@ class PictureResult:
         return self.outcomes.count(WRONG_PLACE)
 
     @property
+    def is_unread(self) -> bool:
+        """No marker is reported."""
+        return not self.outcomes.strip(UNSEEN + LOST)
+
+    @property
     def measured_share(self) -> float:
         return self.measured / self.visible if self.visible else 0.0
 
     @property
     def rms_px(self) -> float:
-        """Per axis, of right markers; NaN without any."""
-        return float(np.sqrt(self.squared_px2 / (2 * self.right))) if self.right else float("nan")
+        """See the function."""
+        return rms_px([self])
+
+
+def rms_px(results: Sequence[PictureResult]) -> float:
+    """RMS error per axis of the right markers of all pictures; NaN without any."""
+    right = 2 * sum(result.right for result in results)
+    return math.sqrt(sum(result.squared_px2 for result in results) / right) if right else math.nan
 
 
 @cache
@@ -92,19 +115,17 @@ def read_case(case: CameraCase, preset: Preset) -> PictureResult:
             markers = extractor.extract(picture.image)
             times_ms.append(1e3 * (time.process_time() - started))
     except Exception as error:
-        return raised_result(case, chain.pose.pitch_px, picture, repr(error))
-    return score_picture(case, chain.pose.pitch_px, picture, markers, min(times_ms))
+        return raised_result(case, picture, repr(error))
+    return score_picture(case, picture, markers, min(times_ms))
 
 
-def raised_result(case: CameraCase, pitch_px: float, picture: CameraPicture, reason: str) -> PictureResult:
-    """The result of a picture on which the extractor raised an exception: all markers are lost, no time is known."""
-    outcomes = "".join(np.where(picture.visible, LOST, UNSEEN))
-    visible = int(picture.visible.sum())
-    none = float("nan")
-    contrast = picture_contrast(picture)
+def raised_result(case: CameraCase, picture: CameraPicture, reason: str) -> PictureResult:
+    """The result of a picture on which the extractor raised an exception: all markers are lost."""
     return PictureResult(
-        case, pitch_px, outcomes, np.empty(0), 0.0, 0, 0, visible, none, reason, contrast, True
-    )
+        case=case, outcomes="".join(np.where(picture.visible, LOST, UNSEEN)), d2=np.empty(0), squared_px2=0.0, right=0,
+        measured=0, visible=int(picture.visible.sum()), ms=math.nan, reason=reason, contrast=picture_contrast(picture),
+        raised=True,
+    )  # fmt: skip
 
 
 def picture_contrast(picture: CameraPicture) -> float:
@@ -113,16 +134,14 @@ def picture_contrast(picture: CameraPicture) -> float:
 
 
 def score_picture(
-    case: CameraCase, pitch_px: float, picture: CameraPicture, markers: Markers, ms: float
+    case: CameraCase, picture: CameraPicture, markers: Markers, ms: float = math.nan
 ) -> PictureResult:
     """The result of markers that were read in a picture in ``ms``."""
     outcome = marker_outcomes(picture, markers)
     error_px = markers.xy_px - picture.marker_xy_px
-    measured = markers.status == Status.MEASURED
-    right = outcome == MEASURED
+    measured, right = markers.status == Status.MEASURED, outcome == MEASURED
     return PictureResult(
         case=case,
-        pitch_px=pitch_px,
         outcomes="".join(outcome),
         d2=squared_distances(error_px[measured], markers.cov_px2[measured]),
         squared_px2=float((error_px[right] ** 2).sum()),
@@ -130,23 +149,19 @@ def score_picture(
         measured=int((measured & picture.visible).sum()),
         visible=int(picture.visible.sum()),
         ms=ms,
-        reason=str(markers.reason) if markers.reason else "",
+        reason=str(markers.reason or ("" if markers.found else NO_REASON)),
         contrast=picture_contrast(picture),
     )
 
 
 def marker_outcomes(picture: CameraPicture, markers: Markers) -> NDArray[np.str_]:
     """(M,) letters, see ``PictureResult``."""
-    true_px = picture.marker_xy_px
-    reported = markers.status != Status.LOST
-    error_px = np.linalg.norm(markers.xy_px - true_px, axis=1)
-    wrong = reported & ~(error_px <= WRONG_SHARE * shortest_edges(picture.layout, true_px))
+    true_px, is_measured = picture.marker_xy_px, markers.status == Status.MEASURED
+    wrong = wrong_markers(markers, true_px, WRONG_SHARE * shortest_edges(picture.layout, true_px))
     outcome = np.full(len(true_px), UNSEEN)
     outcome[picture.visible] = ESTIMATED
-    outcome[picture.visible & ~reported] = LOST
-    outcome[picture.visible & (markers.status == Status.MEASURED)] = MEASURED
-    outcome[wrong] = WRONG_PLACE
-    numbers = np.flatnonzero(wrong & np.isfinite(markers.xy_px).all(axis=1))
-    distance_px = np.linalg.norm(markers.xy_px[numbers][:, None] - true_px, axis=2)
-    outcome[numbers[distance_px.argmin(axis=1) != numbers]] = WRONG_ID
+    outcome[picture.visible & (markers.status == Status.LOST)] = LOST
+    outcome[picture.visible & is_measured] = MEASURED
+    outcome[wrong.places] = WRONG_PLACE
+    outcome[wrong.ids] = WRONG_ID
     return outcome

@@ -12,10 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.suites.article.corners import fit_plain_triangles
-from benchmarks.suites.article.graph import connect_corners
-from benchmarks.suites.article.numbering import make_lattice_tables, number_triangles
-from benchmarks.suites.article.regions import grow_from_hues
+from benchmarks.suites.article.method import ArticleReader
 from benchmarks.suites.scenes import (
     BOARD_LAYERS,
     SceneCase,
@@ -24,16 +21,14 @@ from benchmarks.suites.scenes import (
     make_extractor,
 )
 from extractor import Extractor
-from extractor.pipeline import ImageReader
 from extractor.presets import Preset
 
 Image = NDArray[np.uint8]
 Points = NDArray[np.float64]
 INNER_CORNERS = (2 * BOARD_LAYERS, 2 * BOARD_LAYERS)
 SB_FLAGS = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
-HALF_WINDOW_PX = (
-    5  # of cornerSubPix: 11 px, the largest window with one corner only at a pitch of 20 px, tilted
-)
+# Of cornerSubPix: 11 px, the largest window with one corner only at a pitch of 20 px, tilted.
+HALF_WINDOW_PX = 5
 SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
 REFERENCE_METHOD = "OpenCV findChessboardCornersSB"
 MEASURING_STAGES = ("refine", "repair")  # the stages after the 7th
@@ -112,17 +107,17 @@ def read_subpix_by_id(case: SceneCase, image: Image) -> FoundPoints:
     return FoundPoints(points, coarse.ms + _elapsed_ms(started))
 
 
+@cache
+def article_reader(pattern: str, layers: int) -> ArticleReader:
+    return ArticleReader(cached_reference(pattern, layers))
+
+
 def read_by_article(case: SceneCase, image: Image) -> FoundPoints:
     """The article's method: regions by AGA, triangles fitted to contours, merged and averaged corners, SSA."""
-    layout, reader = cached_reference(case.pattern, case.layers), method_extractor(case, "balanced")
-    lattice = make_lattice_tables(layout)
+    reader = article_reader(case.pattern, case.layers)
     started = time.process_time()
-    points = np.full((len(layout.layer), 2), np.nan)
-    pyramid = ImageReader(reader.layout).pyramid(image)
-    assert pyramid is not None
-    view = pyramid.level(1)
-    triangles = fit_plain_triangles(grow_from_hues(view, dict(layout.palette)))
-    found = number_triangles(image, triangles, connect_corners(triangles), lattice)
+    points = np.full((len(cached_reference(case.pattern, case.layers).layer), 2), np.nan)
+    triangles, found = reader.read(image)
     if found is not None:
         ids = found.marker_of_corner.reshape(-1)
         corner = triangles.corner_px.reshape(-1, 2)[ids >= 0]

@@ -9,9 +9,8 @@ from typing import Any
 from benchmarks.frame.conditions import conditions_text
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
-from benchmarks.suites.comparison.measure import MethodResult
+from benchmarks.suites.comparison.measure import MethodResult, PooledResult
 from benchmarks.suites.comparison.methods import METHODS
-from benchmarks.suites.comparison.pooled import PooledResult
 from extractor.presets import PRESETS
 
 COLUMNS = {

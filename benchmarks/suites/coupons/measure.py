@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.pooled import Columns, Figure, joined, pooled_table, rms_of
+from benchmarks.frame.table import Table
 from benchmarks.suites.coupons.cases import CouponCase, random_case
 from benchmarks.suites.coupons.photograph import photograph_coupon
 from cmpdesign.design.design import load_design
@@ -17,6 +19,7 @@ from cmpdesign.products.laser.coupon.photo import read_coupon
 from cmpdesign.products.laser.setup import complete_setup
 
 FINE_DPI = 600.0
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,30 +27,9 @@ class CouponErrors:
     """The reading of one case: errors and stated deviations of all kerfs, mm."""
 
     case: CouponCase
-    error_mm: NDArray[np.float64]
-    sigma_mm: NDArray[np.float64]
+    error_mm: Floats
+    sigma_mm: Floats
     response: str
-
-
-class PooledErrors(NamedTuple):
-    """Figures of several cases.
-
-    Attributes:
-        pictures: number of cases.
-        mean_um, rms_um: mean and RMS error of all kerfs.
-        worst_um: the largest mean error of one picture.
-        stated_um: RMS of the stated deviations.
-        z: RMS of error over stated deviation.
-        beyond: share of kerfs beyond three stated deviations.
-    """
-
-    pictures: int
-    mean_um: float
-    rms_um: float
-    worst_um: float
-    stated_um: float
-    z: float
-    beyond: float
 
 
 def standard_coupon() -> Coupon:
@@ -70,22 +52,24 @@ def read_case(coupon: Coupon, number: int, seed: int) -> CouponErrors:
     )
 
 
-def pool_errors(errors: Sequence[CouponErrors]) -> PooledErrors:
-    """Pool the errors of all kerfs of several cases."""
-    error = 1000 * np.concatenate([one.error_mm for one in errors])
-    sigma = 1000 * np.concatenate([one.sigma_mm for one in errors])
-    z = error / sigma
-    return PooledErrors(
-        pictures=len(errors),
-        mean_um=float(error.mean()),
-        rms_um=float(np.sqrt((error**2).mean())),
-        worst_um=max(1000 * abs(float(one.error_mm.mean())) for one in errors),
-        stated_um=float(np.sqrt((sigma**2).mean())),
-        z=float(np.sqrt((z**2).mean())),
-        beyond=float((np.abs(z) > 3).mean()),
-    )
+def _of_kerfs(figure: Callable[[Floats, Floats], Any]) -> Figure:
+    """A figure of the errors and the stated deviations of all kerfs of several cases, um."""
+
+    def pooled(errors: Sequence[CouponErrors]) -> float:
+        return float(figure(1000 * joined(errors, "error_mm"), 1000 * joined(errors, "sigma_mm")))
+
+    return pooled
 
 
+COLUMNS: Columns = {
+    "pictures": ("d", len),
+    "mean um": ("+.2f", _of_kerfs(lambda error, _: error.mean())),
+    "RMS um": (".2f", _of_kerfs(lambda error, _: rms_of(error))),
+    "worst picture": (".2f", lambda errors: max(1000 * abs(one.error_mm.mean()) for one in errors)),
+    "stated um": (".2f", _of_kerfs(lambda _, sigma: rms_of(sigma))),
+    "z": (".2f", _of_kerfs(lambda error, sigma: rms_of(error / sigma))),
+    "> 3": (".1%", _of_kerfs(lambda error, sigma: (np.abs(error / sigma) > 3).mean())),
+}
 GROUPS: dict[str, Callable[[CouponCase], bool]] = {
     "all": lambda case: True,
     "600 dpi and more": lambda case: case.dpi >= FINE_DPI,
@@ -99,3 +83,9 @@ GROUPS: dict[str, Callable[[CouponCase], bool]] = {
     "exponent": lambda case: case.view.response != "srgb",
     "JPEG": lambda case: case.view.jpeg_quality is not None,
 }
+
+
+def kerfs_table(errors: Sequence[CouponErrors]) -> Table:
+    """A row for every group of pictures."""
+    groups = {name: [one for one in errors if belongs(one.case)] for name, belongs in GROUPS.items()}
+    return pooled_table("kerfs", "", COLUMNS, groups)

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.pooled import rms_of
 from benchmarks.suites.lenses.cameras import SIZE_PX, TrueCamera
 from benchmarks.suites.lenses.pictures import Conditions, take_pictures
 from benchmarks.suites.scenes import BOARD_LAYERS, checkerboard_layout
@@ -87,7 +88,7 @@ def board_error_px(
             except cv2.error:  # no such lens fits
                 continue
             if np.isfinite(error).all():
-                errors.append(float(np.sqrt(np.mean(error**2))))
+                errors.append(rms_of(error))
     return min(errors, default=float("nan"))
 
 

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT
 from benchmarks.suites.lenses.cameras import SIZE_PX
 from cmpdesign.calibration.camera import CameraCalibration
@@ -60,11 +61,6 @@ def seen_pixels(points_px: Sequence[Array]) -> Array:
     return grid[[cv2.pointPolygonTest(hull, (float(x), float(y)), False) > 0 for x, y in grid]]
 
 
-def rms(error: Array) -> float:
-    """RMS per axis."""
-    return float(np.sqrt(np.nanmean(error**2)))
-
-
 def rays_z(found: CameraCalibration, true: View, pixels: Array) -> float:
     """The RMS of the rays' errors over their covariances."""
     error, cov = (
@@ -88,19 +84,19 @@ def parameters_z(found: CameraCalibration, true: View) -> float:
 
 def model_ratio(found: CameraCalibration, true: View, pixels: Array) -> float:
     """The ray error over the least one of all models, each on the pictures that are used."""
-    problem, errors = found.adjusted.problem, [rms(ray_differences(found.camera, true, pixels))]
+    problem, errors = found.adjusted.problem, [rms_of(ray_differences(found.camera, true, pixels))]
     for model in MODELS:
         if model != problem.model:
             one = choose_model(problem, found.adjusted.guess, [model]).camera
             error = ray_differences(true, one, pixels)
-            errors += [rms(error)] if np.isfinite(error).all() else []
+            errors += [rms_of(error)] if np.isfinite(error).all() else []
     return errors[0] / min(errors)
 
 
 def pooled_row(name: str, rows: Sequence[CameraFigures]) -> tuple[object, ...]:
     """One row of the table."""
     pooled = {
-        one: float(np.sqrt(np.nanmean(np.square([getattr(row, one) for row in rows] or [np.nan]))))
+        one: rms_of([getattr(row, one) for row in rows])
         for one in ("seen_px", "stated_px", "z", "image_px", "parameters_z", "board_px")
         if np.isfinite([getattr(row, one) for row in rows]).any()
     }
@@ -119,6 +115,6 @@ def pooled_row(name: str, rows: Sequence[CameraFigures]) -> tuple[object, ...]:
         f"{sum(row.bad_found for row in rows)} of {sum(row.bad for row in rows)}",
         sum(row.good_refused for row in rows),
         board_px,
-        board_px / rms(np.array(both)) if both else float("nan"),
+        board_px / rms_of(np.array(both)) if both else float("nan"),
         float(np.median([row.cpu_s for row in rows])),
     )

@@ -50,6 +50,29 @@ class DepthErrors:
     misfit: float
     warned: bool
 
+    @property
+    def mean_um(self) -> float:
+        """The mean absolute depth error."""
+        return float(np.abs(self.depth_um).mean())
+
+    @property
+    def bias_um(self) -> float:
+        """The absolute mean depth error."""
+        return abs(float(self.depth_um.mean()))
+
+    @property
+    def limit_um(self) -> float:
+        """Limit of the mean depth error with true constants."""
+        return LIMIT_UM + 1e3 * LIMIT_SHARE * self.press_mm
+
+    @property
+    def short_percent(self) -> float:
+        return 100 * self.short
+
+    @property
+    def warned_percent(self) -> float:
+        return 100.0 * self.warned
+
 
 def measure_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[DepthErrors]:
     """The errors of every press under every assumption."""
@@ -88,54 +111,3 @@ def depth_errors(row: str, found: RandomRig, reading: PressedFrame, medium: Medi
 def squares(error: Array, cov: Array) -> Array:
     """(N,) squared errors over their covariances, per axis."""
     return np.asarray(np.einsum("ni,nij,nj->n", error, np.linalg.inv(cov), error) / error.shape[1])
-
-
-@dataclass(frozen=True)
-class PooledErrors:
-    """The errors of many frames under one assumption, see the module.
-
-    Attributes:
-        mean_um: the mean over frames of the mean absolute depth error.
-        bias_um: the mean over frames of the absolute mean depth error.
-        short_percent: the mean; ``short_range_percent``: smallest and largest value.
-        z_position, z_displacement: see the module.
-        misfit: of the rest frames, median.
-        warned_percent: of the frames.
-    """
-
-    label: str
-    frames: int
-    press_mm: float
-    mean_um: float
-    bias_um: float
-    short_percent: float
-    short_range_percent: tuple[float, float]
-    z_position: float
-    z_displacement: float
-    misfit: float
-    warned_percent: float
-
-    @property
-    def limit_um(self) -> float:
-        """Limits of the mean depth error with true constants."""
-        return LIMIT_UM + 1e3 * LIMIT_SHARE * self.press_mm
-
-
-def pool(label: str, errors: list[DepthErrors]) -> PooledErrors:
-    short = [100 * each.short for each in errors]
-    z = [
-        float(np.sqrt(np.concatenate([getattr(each, name) for each in errors]).mean()))
-        for name in ("position", "displacement")
-    ]
-    return PooledErrors(
-        label,
-        len(errors),
-        float(np.mean([each.press_mm for each in errors])),
-        float(np.mean([np.abs(each.depth_um).mean() for each in errors])),
-        float(np.mean([abs(each.depth_um.mean()) for each in errors])),
-        float(np.mean(short)),
-        (min(short), max(short)),
-        *z,
-        float(np.median([each.misfit for each in errors])),
-        100 * float(np.mean([each.warned for each in errors])),
-    )

@@ -8,20 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.suites.halves import rig_of, two_cameras
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
 from cmpdesign.layout.layout import Layout
-from cmpdesign.scene import Medium, Optics, Pinhole, Plain, Scene, Sensor, Truth, WindowPlane, render
-from cmpdesign.scene.standard import BLACK_RGB, INKS
-from extractor import Markers, Rig, View, ViewExtractor, parse_layout
+from cmpdesign.scene import Medium, Pinhole, Truth, WindowPlane, render, standard_scene
+from extractor import Markers, Rig, ViewExtractor, parse_layout
 from extractor import Medium as ReadMedium
 
 Array = NDArray[np.float64]
 
 SIZE = (1280, 480)
-DISTORTION = (-0.08, 0.03, 0.0005, -0.0008, 0.0)
 LAYERS_PER_MM = 10 / 56  # the pattern fills the same share of the image at every distance
 PRESSES_MM = ((0.3, 0.5), (0.5, 0.8), (0.8, 1.0))
 WINDOW_INDICES = (1.49, 1.52)  # acrylic, glass
@@ -31,8 +30,6 @@ WINDOW_INDICES = (1.49, 1.52)  # acrylic, glass
 class RandomRig:
     """A sensor, drawn at random."""
 
-    distance_mm: float
-    angle_deg: float
     medium: Medium
     layout: Layout
     cameras: tuple[Pinhole, ...]
@@ -42,12 +39,7 @@ class RandomRig:
         read = None
         if medium is not None:
             read = ReadMedium(medium.gel_mm, medium.gel_index, medium.window_mm, medium.window_index)
-        return Rig(
-            tuple(
-                View(c.name, c.focal_px, c.centre_px, c.distortion, c.area_px, medium=read)
-                for c in self.cameras
-            )
-        )
+        return rig_of(self.cameras, read)
 
     def tilted(self, azimuth_rad: float, tilt_rad: float) -> tuple[Pinhole, ...]:
         """The cameras with a window that is tilted against the pattern; the gel's thickness in the middle does not
@@ -81,25 +73,11 @@ def random_rig(rng: np.random.Generator) -> RandomRig:
         float(rng.uniform(2, 5)), 1.41, float(rng.uniform(2, 3)), float(rng.choice(WINDOW_INDICES))
     )
     layers = str(max(3, round(LAYERS_PER_MM * distance_mm)))
-    width, height = SIZE[0] // 2, SIZE[1]
-    cameras = tuple(
-        Pinhole.looking(
-            SIZE,
-            distance_mm=distance_mm,
-            field_of_view_deg=44.0,
-            tilt_deg=angle_deg,
-            azimuth_deg=azimuth,
-            roll_deg=float(rng.uniform(-2, 2)),
-            back=True,
-            distortion=DISTORTION,
-            area_px=(k * width, 0, width, height),
-            name=name,
-        )
-        for k, (name, azimuth) in enumerate((("left", 180.0), ("right", 0.0)))
+    rolls_deg = [float(rng.uniform(-2, 2)) for _ in range(2)]
+    cameras = two_cameras(
+        SIZE, rolls_deg, distance_mm=distance_mm, field_of_view_deg=44.0, tilt_deg=angle_deg
     )
-    return RandomRig(
-        distance_mm, angle_deg, medium, build_layout(load_design("tac3d", {"layers": layers})), cameras
-    )
+    return RandomRig(medium, build_layout(load_design("tac3d", {"layers": layers})), cameras)
 
 
 def read_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[tuple[PressedFrame, PressedFrame]]:
@@ -107,14 +85,7 @@ def read_rig(found: RandomRig, rng: np.random.Generator) -> Iterator[tuple[Press
     views = ViewExtractor(parse_layout(layout_to_json(found.layout)), found.rig(found.medium))
     windows = (found.cameras, found.tilted(float(rng.uniform(0, 2 * np.pi)), np.radians(1.0)))
     half_mm = float(np.abs(found.layout.marker_xy_mm).max())
-    scene = Scene(
-        found.layout,
-        background=Plain(BLACK_RGB),
-        optics=Optics(1.0),
-        sensor=Sensor(noise=2.0),
-        inks=INKS,
-        medium=found.medium,
-    )
+    scene = replace(standard_scene(found.layout), medium=found.medium)
     rests = [
         views.extract(render(replace(scene, camera=cameras, seed=_seed(rng)), size=SIZE).image)
         for cameras in windows

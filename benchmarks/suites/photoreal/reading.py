@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from benchmarks.suites.photoreal.pictures import NO_PATTERN, TracedPicture, TracedTruth
 from benchmarks.suites.scoring.calibration import squared_distances
+from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.files.layout_json import layout_to_json
 from extractor import Extractor, Markers, Reason, Reference, Status, parse_layout
 from extractor.presets import Preset
@@ -61,6 +62,11 @@ class TracedResult:
         return self.visible - len(self.unmeasured)
 
     @property
+    def invented(self) -> int:
+        """Markers that are reported where there is no pattern."""
+        return self.reported if self.picture.family == NO_PATTERN else 0
+
+    @property
     def is_read(self) -> bool:
         return self.reported > 0
 
@@ -80,14 +86,14 @@ def read_picture(picture: TracedPicture, preset: Preset = "balanced", runs: int 
         informed = _extractor(picture, preset, True).extract(picture.image)
         squares[WITH_DATA] = _squares(informed, truth.xy_lines_px)
     unmeasured = truth.visible & (markers.status != Status.MEASURED)
-    ids, places = wrong_markers(markers, truth)
+    wrong = wrong_markers(markers, truth.xy_px, WRONG_SHARE * truth.edge_px)
     return TracedResult(
         picture=picture,
         visible=int(truth.visible.sum()) if has_pattern else 0,
         unmeasured=tuple(np.flatnonzero(unmeasured).tolist()) if has_pattern else (),
         reported=int((markers.status != Status.LOST).sum()),
-        wrong_ids=int(ids.sum()) if has_pattern else 0,
-        wrong_places=int(places.sum()) if has_pattern else 0,
+        wrong_ids=int(wrong.ids.sum()) if has_pattern else 0,
+        wrong_places=int(wrong.places.sum()) if has_pattern else 0,
         squares=squares,
         reason=str(markers.reason or ""),
         is_reason_right=is_reason_right(markers, truth, extractor.layout, has_pattern),
@@ -118,18 +124,6 @@ def place_squares(markers: Markers, truth: TracedTruth) -> dict[str, NDArray[np.
 def _squares(markers: Markers, true_px: NDArray[np.float64]) -> NDArray[np.float64]:
     measured = markers.status == Status.MEASURED
     return squared_distances((markers.xy_px - true_px)[measured], markers.cov_px2[measured])
-
-
-def wrong_markers(markers: Markers, truth: TracedTruth) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(M,) bool each: reported under another marker's id; reported at a wrong position under the right id."""
-    reported = markers.status != Status.LOST
-    error_px = np.linalg.norm(markers.xy_px - truth.xy_px, axis=1)
-    wrong = reported & ~(error_px <= WRONG_SHARE * truth.edge_px)
-    numbers = np.flatnonzero(wrong)
-    distance_px = np.linalg.norm(markers.xy_px[numbers][:, None] - truth.xy_px, axis=2)
-    ids = np.zeros_like(wrong)
-    ids[numbers] = np.argmin(np.nan_to_num(distance_px, nan=np.inf), axis=1) != numbers
-    return ids, wrong & ~ids
 
 
 def is_reason_right(markers: Markers, truth: TracedTruth, layout: Reference, has_pattern: bool) -> bool:

@@ -8,13 +8,14 @@ picture have errors in common (light, blur, estimated inks). Intervals are there
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.pooled import Figure
 from benchmarks.frame.table import TEXT, Table
 
 BEYOND_D2 = 11.83  # three standard deviations in two dimensions
@@ -131,6 +132,23 @@ def calibration_values(calibration: Calibration) -> tuple[Any, ...]:
         calibration.pictures, calibration.count, z.value, (z.low, z.high), calibration.median_z, beyond.value,
         (beyond.low, beyond.high), calibration.singular,
     )  # fmt: skip
+
+
+def stated_columns(d2_of: Callable[[Any], NDArray[Any] | None]) -> dict[str, tuple[str, Figure]]:
+    """Figures of results whose d2 a function gives; None for a result without any."""
+
+    def column(spec: str, figure: Callable[[Calibration], Any]) -> tuple[str, Figure]:
+        def of_results(results: Sequence[Any]) -> Any:
+            return figure(summarise([d2 for one in results if (d2 := d2_of(one)) is not None]))
+
+        return spec, of_results
+
+    return {
+        "z": column(".2f", lambda found: found.z.value),
+        "median z": column(".2f", lambda found: found.median_z),
+        "beyond": column(".2%", lambda found: found.beyond.value),
+        "95 %": column(".1%", lambda found: (found.beyond.low, found.beyond.high)),
+    }
 
 
 def calibration_table(title: str, found: Mapping[str, Calibration]) -> Table:

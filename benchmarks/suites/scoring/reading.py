@@ -17,7 +17,7 @@ from benchmarks.suites.scoring.score import (
     MarkerScore,
     promised_markers,
     score_markers,
-    wrong_markers,
+    wrong_in_scene,
 )
 from benchmarks.suites.scoring.squares import PictureSquares, nearest_truth, picture_squares
 from benchmarks.suites.stress.conditions import BY_NAME, LARGE_PX
@@ -119,14 +119,6 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
     return CaseReading(result, shot, markers)
 
 
-def warm_up() -> None:
-    """Load all modules before times are measured."""
-    import cv2
-
-    cv2.setNumThreads(1)
-    cached_extractor("honeycomb", 11).extract(render_plain_image("honeycomb"))
-
-
 def notable_lines(shot: CaseImage, markers: Markers | None) -> list[str]:
     """Lines on every wrong marker with position and error, and on the first markers that should not be lost."""
     if markers is None or shot.scene is None:
@@ -153,7 +145,7 @@ def find_wrong_markers(shot: CaseImage, markers: Markers) -> tuple[NDArray[np.bo
     """(M,) bool: the wrong markers, and the truth of the pattern with the fewest wrong markers."""
     assert shot.scene is not None
     layout = shot.scene.layout
-    both = [(wrong_markers(markers, layout, truth), truth) for truth in shot.truths]
+    both = [(wrong_in_scene(markers, layout, truth).any_kind, truth) for truth in shot.truths]
     return min(both, key=lambda one: int(one[0].sum()))
 
 

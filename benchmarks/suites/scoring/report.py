@@ -3,111 +3,91 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
 
-import numpy as np
-
+from benchmarks.frame.pooled import Columns, Figure, grouped, percentile, pooled_table, total
 from benchmarks.frame.table import TEXT, Table
-from benchmarks.suites.scoring.calibration import Calibration, summarise
+from benchmarks.suites.scoring.calibration import stated_columns
 from benchmarks.suites.scoring.reading import CaseResult
 from benchmarks.suites.scoring.squares import MEASURED
-from benchmarks.suites.stress.kinds import ConditionKind
+from benchmarks.suites.stress.conditions import BY_NAME, KINDS
+from benchmarks.suites.stress.kinds import StressCase
 
 PROMISED_SHARE = 0.99
 SLOWEST_RATIO = 1.3
-COLUMNS = {
-    "condition": TEXT, "group": TEXT, "promised": TEXT, "visible": "d", "measured": ".2%", "repaired": ".2%",
-    "fitted": ".2%", "lost": ".2%", "wrong": "d", "outside": "d", "hidden": "d", "kept": ".2%", "rms px": ".4f",
-    "repaired rms px": ".3f", "z": ".2f", "median z": ".2f", "beyond": ".2%", "ms": ".1f", "ratio": ".2f",
-    "reason": TEXT,
-}  # fmt: skip
+Results = Sequence[CaseResult]
+Conditions = Mapping[str, Results]
 
 
-@dataclass(frozen=True)
-class ConditionRow:
-    """All images of one condition. Counts are of markers, see ``MarkerScore``; times are medians.
+def _of_visible(name: str) -> Figure:
+    """A count over the visible markers, or over the reported markers if none is visible."""
 
-    Attributes:
-        promised: yes, no, or the number of images with a promise.
-        calibration: errors of measured markers over their covariances.
-        worst, slowest: names of images.
-    """
+    def figure(results: Results) -> float:
+        markers = total("score.visible")(results) or total("score.reported")(results)
+        return total(f"score.{name}")(results) / markers if markers else 0.0
 
-    condition: str
-    group: str
-    images: int
-    visible: int
-    measured: int
-    repaired: int
-    fitted: int
-    lost: int
-    reported: int
-    wrong: int
-    outside: int
-    hidden: int
-    sure: int
-    kept: int
-    promised: str
-    rms_px: float
-    repaired_rms_px: float
-    calibration: Calibration
-    ms: float
-    ratio: float
-    raised: int
-    reasons: str
-    worst: str
-    slowest: str
-
-    @property
-    def kept_share(self) -> float:
-        """The share of the promised markers that is kept."""
-        return self.kept / self.sure if self.sure else math.nan
-
-    def share(self, name: str) -> float:
-        """A count over the visible markers, or over the reported markers if none is visible."""
-        total = self.visible or self.reported
-        return float(getattr(self, name)) / total if total else 0.0
+    return figure
 
 
-def condition_rows(results: Iterable[CaseResult], kinds: Sequence[ConditionKind]) -> list[ConditionRow]:
-    """One row per condition, in the order of the conditions."""
-    results = list(results)
-    rows = []
-    for kind in kinds:
-        for step in kind.steps:
-            of_condition = [r for r in results if (r.case.kind, r.case.step) == (kind.name, step)]
-            if of_condition:
-                rows.append(_condition_row(kind, sorted(of_condition, key=lambda r: r.case.name)))
-    return rows
+def promised(results: Results) -> list[CaseResult]:
+    """The images with a promise."""
+    return [one for one in results if one.score.promised]
 
 
-def _condition_row(kind: ConditionKind, of_condition: list[CaseResult]) -> ConditionRow:
-    promised = [r for r in of_condition if r.score.promised]
-    counted = ("visible", "measured", "repaired", "fitted", "lost", "reported", "wrong", "outside", "hidden")
-    reasons = sorted({r.reason for r in of_condition if r.reason})
-    return ConditionRow(
-        condition=of_condition[0].case.condition,
-        group=kind.group,
-        images=len(of_condition),
-        **{name: sum(getattr(r.score, name) for r in of_condition) for name in counted},
-        sure=sum(r.score.sure for r in promised),
-        kept=sum(r.score.kept for r in promised),
-        promised=f"{len(promised)}/{len(of_condition)}"
-        if 0 < len(promised) < len(of_condition)
-        else ("yes" if promised else "no"),
-        rms_px=_pooled_rms([(r.score.rms_px, r.score.measured) for r in of_condition]),
-        repaired_rms_px=_pooled_rms(
-            [(r.score.repaired_rms_px, r.score.repaired + r.score.fitted) for r in of_condition]
-        ),
-        calibration=summarise([r.squares[MEASURED] for r in of_condition if r.squares]),
-        ms=_median([r.ms for r in of_condition]),
-        ratio=_median([r.ratio for r in of_condition]),
-        raised=sum(r.raised for r in of_condition),
-        reasons=", ".join(reasons),
-        worst=max(of_condition, key=_severity).case.name,
-        slowest=max(of_condition, key=lambda r: r.ratio if math.isfinite(r.ratio) else 0.0).case.name,
-    )
+def kept_share(results: Results) -> float:
+    """The share of the promised markers that is kept; NaN without a promise."""
+    sure = total("score.sure")(promised(results))
+    return total("score.kept")(promised(results)) / sure if sure else math.nan
+
+
+def _promise(results: Results) -> str:
+    count = len(promised(results))
+    return f"{count}/{len(results)}" if 0 < count < len(results) else "yes" if count else "no"
+
+
+def _pooled_rms(results: Results, name: str, counted: tuple[str, ...]) -> float:
+    """The RMS of the images' RMS, by their counts of markers."""
+    parts = [
+        (getattr(one.score, name), sum(getattr(one.score, count) for count in counted)) for one in results
+    ]
+    known = [(value, count) for value, count in parts if count and math.isfinite(value)]
+    number = sum(count for _, count in known)
+    return math.sqrt(sum(value**2 * count for value, count in known) / number) if number else math.nan
+
+
+def _reasons(results: Results) -> str:
+    return ", ".join(sorted({one.reason for one in results if one.reason}))
+
+
+STATED = stated_columns(lambda result: result.squares.get(MEASURED))
+COLUMNS: Columns = {
+    "group": (TEXT, lambda results: BY_NAME[results[0].case.kind].group),
+    "promised": (TEXT, _promise),
+    "visible": ("d", total("score.visible")),
+    **{name: (".2%", _of_visible(name)) for name in ("measured", "repaired", "fitted", "lost")},
+    **{name: ("d", total(f"score.{name}")) for name in ("wrong", "outside", "hidden")},
+    "kept": (".2%", kept_share),
+    "rms px": (".4f", partial(_pooled_rms, name="rms_px", counted=("measured",))),
+    "repaired rms px": (".3f", partial(_pooled_rms, name="repaired_rms_px", counted=("repaired", "fitted"))),
+    **{name: STATED[name] for name in ("z", "median z", "beyond")},
+    "ms": (".1f", percentile("ms", 50)),
+    "ratio": (".2f", percentile("ratio", 50)),
+    "reason": (TEXT, _reasons),
+}
+
+
+def by_condition(results: Results) -> dict[str, list[CaseResult]]:
+    """The images of each condition, in the order of their names; the conditions in the order of ``KINDS``."""
+    found = grouped(sorted(results, key=lambda one: one.case.name), "case.condition")
+    conditions = (StressCase(kind.name, step, "", 0).condition for kind in KINDS for step in kind.steps)
+    return {condition: found[condition] for condition in conditions if condition in found}
+
+
+def results_table(conditions: Conditions) -> Table:
+    """One row per condition."""
+    return pooled_table("conditions", "condition", COLUMNS, conditions)
 
 
 def _severity(result: CaseResult) -> tuple[bool, int, float]:
@@ -116,53 +96,30 @@ def _severity(result: CaseResult) -> tuple[bool, int, float]:
     return result.raised, figures.wrong, lost
 
 
-def _pooled_rms(parts: list[tuple[float, int]]) -> float:
-    """The RMS of several RMS with their counts."""
-    known = [(value, count) for value, count in parts if count and math.isfinite(value)]
-    total = sum(count for _, count in known)
-    return math.sqrt(sum(value**2 * count for value, count in known) / total) if total else math.nan
+def _failures(results: Results) -> Iterator[tuple[int, float, str]]:
+    """Severity, its size, and a line."""
+    worst = max(results, key=_severity).case.name
+    raised, reasons, kept = total("raised")(results), _reasons(results), kept_share(results)
+    wrong, outside, reported = (total(f"score.{name}")(results) for name in ("wrong", "outside", "reported"))
+    if raised:
+        yield 0, -raised, f"RAISED   {raised:>6} images    {worst}  {reasons}"
+    if wrong:
+        yield 1, -wrong, f"WRONG    {wrong:>6} of {reported:<6} {worst}"
+    if outside:
+        yield 2, -outside, f"OUTSIDE  {outside:>6} of {reported:<6} {worst}"
+    if kept < PROMISED_SHARE:
+        note = f"  ({reasons})" if reasons else ""
+        yield 3, kept, f"LOST     {100 * kept:>6.2f} % kept     {worst}{note}"
+    ratio = percentile("ratio", 50)(results)
+    if ratio > SLOWEST_RATIO:
+        slowest = max(results, key=lambda one: one.ratio if math.isfinite(one.ratio) else 0.0)
+        yield 4, -ratio, f"SLOW     {ratio:>6.2f} x plain    {slowest.case.name}"
 
 
-def _median(values: list[float]) -> float:
-    known = [value for value in values if math.isfinite(value)]
-    return float(np.median(known)) if known else math.nan
-
-
-def failure_lines(rows: list[ConditionRow]) -> list[str]:
+def failure_lines(conditions: Conditions) -> list[str]:
     """One line per failure, the severest first: raised, wrong, outside the image, promise broken, slow."""
-    found: list[tuple[int, float, str]] = []
-    for row in rows:
-        if row.raised:
-            found.append((0, -row.raised, f"RAISED   {row.raised:>6} images    {row.worst}  {row.reasons}"))
-        if row.wrong:
-            found.append((1, -row.wrong, f"WRONG    {row.wrong:>6} of {row.reported:<6} {row.worst}"))
-        if row.outside:
-            found.append((2, -row.outside, f"OUTSIDE  {row.outside:>6} of {row.reported:<6} {row.worst}"))
-        if row.sure and row.kept_share < PROMISED_SHARE:
-            note = f"  ({row.reasons})" if row.reasons else ""
-            found.append(
-                (3, row.kept_share, f"LOST     {100 * row.kept_share:>6.2f} % kept     {row.worst}{note}")
-            )
-        if row.ratio > SLOWEST_RATIO:
-            found.append((4, -row.ratio, f"SLOW     {row.ratio:>6.2f} x plain    {row.slowest}"))
+    found = [failure for results in conditions.values() for failure in _failures(results)]
     return [line for _, _, line in sorted(found)]
-
-
-def results_table(rows: Sequence[ConditionRow]) -> Table:
-    """The table of all rows."""
-    shares = ("measured", "repaired", "fitted", "lost")
-    return Table(
-        "conditions",
-        COLUMNS,
-        [
-            (
-                row.condition, row.group, row.promised, row.visible, *(row.share(name) for name in shares), row.wrong,
-                row.outside, row.hidden, row.kept_share, row.rms_px, row.repaired_rms_px, row.calibration.z.value,
-                row.calibration.median_z, row.calibration.beyond.value, row.ms, row.ratio, row.reasons,
-            )
-            for row in rows
-        ],
-    )  # fmt: skip
 
 
 def result_line(result: CaseResult) -> str:
@@ -176,21 +133,21 @@ def result_line(result: CaseResult) -> str:
     )
 
 
-def summary_text(rows: list[ConditionRow]) -> str:
+def summary_text(conditions: Conditions) -> str:
     """One line of totals and one of promises."""
-    total = {
-        name: sum(getattr(row, name) for row in rows)
-        for name in ("images", "visible", "reported", "wrong", "sure", "kept")
-    }
-    empty = [row for row in rows if row.group == "nothing"]
-    promised = [row for row in rows if row.sure]
-    kept_promises = sum(row.kept_share >= PROMISED_SHARE for row in promised)
-    slow = sum(row.ratio > SLOWEST_RATIO for row in rows)
-    images = sum(row.images for row in empty)
+    every = [one for results in conditions.values() for one in results]
+    empty = [one for one in every if BY_NAME[one.case.kind].group == "nothing"]
+    kept = [share for share in map(kept_share, conditions.values()) if math.isfinite(share)]
+    slow = sum(percentile("ratio", 50)(results) > SLOWEST_RATIO for results in conditions.values())
+
+    def count(name: str, results: Results = every) -> Any:
+        return total(f"score.{name}")(results)
+
     return (
-        f"{len(rows)} conditions, {total['images']} images, {total['visible']} visible markers\n"
-        f"{total['wrong']} wrong of {total['reported']} reported, {sum(row.wrong for row in empty)} of them on "
-        f"{images} images without a pattern\n"
-        f"promise (99 % measured or repaired) held in {kept_promises} of {len(promised)} conditions, "
-        f"{100 * total['kept'] / max(total['sure'], 1):.2f} % together; slower than {SLOWEST_RATIO} x plain: {slow}"
+        f"{len(conditions)} conditions, {len(every)} images, {count('visible')} visible markers\n"
+        f"{count('wrong')} wrong of {count('reported')} reported, {count('wrong', empty)} of them on "
+        f"{len(empty)} images without a pattern\n"
+        f"promise (99 % measured or repaired) held in {sum(share >= PROMISED_SHARE for share in kept)} of "
+        f"{len(kept)} conditions, {100 * kept_share(every):.2f} % together; "
+        f"slower than {SLOWEST_RATIO} x plain: {slow}"
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.pooled import rms_of
 from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges
+from benchmarks.suites.scoring.wrong import WrongMarkers, wrong_markers
 from benchmarks.suites.stress.frames import CaseImage
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, WHITE
@@ -28,7 +30,7 @@ class MarkerScore:
     Attributes:
         visible: visible by the truth; of these measured, repaired, fitted, lost.
         reported: not lost, visible or not.
-        wrong: reported with an error above 0.3 of the shortest edge.
+        wrong: reported with an error above 0.3 of the shortest edge; ``others`` of them are nearest to another marker.
         outside: reported with a true position outside the image.
         hidden: reported with a true position inside the image, but not visible.
         sure: markers of ``promised_markers``.
@@ -45,6 +47,7 @@ class MarkerScore:
     lost: int
     reported: int
     wrong: int
+    others: int
     outside: int
     hidden: int
     sure: int
@@ -58,19 +61,17 @@ def score_markers(markers: Markers, shot: CaseImage, *, promised: bool) -> Marke
     """The best score over the patterns in the image; without a pattern all reported markers are wrong."""
     if shot.scene is None:
         reported = int((markers.status != Status.LOST).sum())
-        nan = float("nan")
-        return MarkerScore(0, 0, 0, 0, 0, reported, reported, 0, 0, 0, 0, False, nan, nan)
+        return replace(EMPTY_SCORE, reported=reported, wrong=reported)
     scene = shot.scene
     one = promised and len(shot.truths) == 1
     scores = [_score_pattern(markers, truth, scene, shot.image.shape, promised=one) for truth in shot.truths]
     return min(scores, key=lambda result: (result.wrong, -result.reported))
 
 
-def wrong_markers(markers: Markers, layout: Layout, truth: Truth) -> Bools:
-    """(M,) bool: reported markers with an error above 0.3 of the shortest edge."""
-    error = np.linalg.norm(markers.xy_px - truth.marker_xy_px, axis=1)
-    is_right = error <= WRONG_SHARE * shortest_edges(layout, truth.marker_xy_px)
-    return np.asarray((markers.status != Status.LOST) & ~is_right)
+def wrong_in_scene(markers: Markers, layout: Layout, truth: Truth) -> WrongMarkers:
+    """The markers with an error above 0.3 of the shortest edge."""
+    true_px = truth.marker_xy_px
+    return wrong_markers(markers, true_px, WRONG_SHARE * shortest_edges(layout, true_px))
 
 
 def promised_markers(layout: Layout, truth: Truth, shape: tuple[int, ...]) -> Bools:
@@ -85,7 +86,8 @@ def _score_pattern(
     markers: Markers, truth: Truth, scene: Scene, shape: tuple[int, ...], *, promised: bool
 ) -> MarkerScore:
     status, layout, visible = markers.status, scene.layout, truth.visible
-    wrong = wrong_markers(markers, layout, truth)
+    swapped, misplaced = wrong_in_scene(markers, layout, truth)
+    wrong = swapped | misplaced
     reported = status != Status.LOST
     true_px = truth.marker_xy_px
     inside = np.all((true_px >= -0.5) & (true_px < np.array(shape[1::-1]) - 0.5), axis=1)
@@ -99,6 +101,7 @@ def _score_pattern(
         lost=counts[Status.LOST],
         reported=int(reported.sum()),
         wrong=int(wrong.sum()),
+        others=int(swapped.sum()),
         outside=int((reported & ~inside).sum()),
         hidden=int((reported & inside & ~visible).sum()),
         sure=int(promised_mask.sum()),
@@ -110,8 +113,7 @@ def _score_pattern(
 
 
 def _rms(markers: Markers, truth: Truth, chosen: Bools) -> float:
-    error = markers.xy_px[chosen] - truth.marker_xy_px[chosen]
-    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
+    return rms_of(markers.xy_px[chosen] - truth.marker_xy_px[chosen])
 
 
 def _is_promised(scene: Scene, truth: Truth, promised_mask: Bools, shape: tuple[int, ...]) -> bool:
@@ -145,4 +147,4 @@ def smallest_contrast(scene: Scene, truth: Truth, size: tuple[int, int]) -> floa
     return float(contrast.max(axis=1).min())
 
 
-EMPTY_SCORE = MarkerScore(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, False, float("nan"), float("nan"))
+EMPTY_SCORE = MarkerScore(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, False, float("nan"), float("nan"))

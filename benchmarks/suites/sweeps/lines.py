@@ -56,6 +56,14 @@ class LineResult:
     wrong_ids: int
 
     @property
+    def steps(self) -> int:
+        return len(self.reasons)
+
+    @property
+    def read(self) -> int:
+        return self.reasons.count("")
+
+    @property
     def between(self) -> int:
         """Steps that are refused between two that are read."""
         is_read = np.array([not reason for reason in self.reasons])

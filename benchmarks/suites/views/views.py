@@ -68,6 +68,10 @@ class ViewResult:
     wrong_ids: int
     reason: str
 
+    @property
+    def is_read(self) -> bool:
+        return self.reported > 0
+
 
 @dataclass(frozen=True, eq=False)
 class ShotView:

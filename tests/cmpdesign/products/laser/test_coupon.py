@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner, Result
 
-from benchmarks.suites.coupons.measure import FINE_DPI, pool_errors, read_case, standard_coupon
+from benchmarks.suites.coupons.measure import kerfs_table, read_case, standard_coupon
 from cmpdesign.cli import app
 from cmpdesign.design.design import load_design
 from cmpdesign.products.laser.coupon.design import Coupon, coupon_to_json, design_coupon, load_coupon
@@ -97,15 +97,15 @@ def test_clipped_pictures_are_refused(conditions: dict[str, float], expected: st
 def test_pooled_errors_over_random_coupons() -> None:
     """The benchmark's suite, with another seed: the stated deviations agree with the errors."""
     errors = [read_case(standard_coupon(), number, 20) for number in range(200)]
-    pooled = pool_errors(errors)
-    assert 0.8 <= pooled.z <= 1.3
-    fine = pool_errors([one for one in errors if one.case.dpi >= FINE_DPI])
-    assert abs(fine.mean_um) <= 4
+    rows = {row[""]: row for row in kerfs_table(errors).records()}
+    assert 0.8 <= rows["all"]["z"] <= 1.3
+    assert abs(rows["600 dpi and more"]["mean um"]) <= 4
 
 
 def test_some_random_coupons() -> None:
-    pooled = pool_errors([read_case(standard_coupon(), number, 3) for number in range(3)])
-    assert 0.2 < pooled.z < 2 and pooled.beyond < 0.05 and pooled.stated_um < 12
+    errors = [read_case(standard_coupon(), number, 3) for number in range(3)]
+    pooled = kerfs_table(errors).records()[0]
+    assert 0.2 < pooled["z"] < 2 and pooled["> 3"] < 0.05 and pooled["stated um"] < 12
 
 
 def test_the_drawing_cuts_what_the_file_says() -> None:
