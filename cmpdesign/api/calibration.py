@@ -315,9 +315,9 @@ def calibrate_check(
 
 def _require_other(output: str | Path | None, given: object, what: str) -> None:
     """Check that the file to write is not the given one."""
-    if output is not None and isinstance(given, str | Path):
-        if Path(output).resolve() == Path(given).resolve():
-            raise CmpDesignError(f"{output} is {what}; choose another name")
+    given_file = Path(given).resolve() if isinstance(given, str | Path) else None
+    if output is not None and Path(output).resolve() == given_file:
+        raise CmpDesignError(f"{output} is {what}; choose another name")
 
 
 def _read_views(
