@@ -181,6 +181,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("accuracy", measure, page)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

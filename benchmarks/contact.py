@@ -7,7 +7,6 @@ some with its kernels. "RMS" and "max" are distances of markers from their posit
 from __future__ import annotations
 
 import math
-import time
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import Timed, timed
 from cmpdesign.contact import Ball, Contact, Cube, Elastomer, Indenter, Motion, Punch, Ring, solve
 from cmpdesign.contact.elastic_layer.green import green_kernels
 from cmpdesign.scene import standard_layout
@@ -52,31 +52,25 @@ COLUMNS = {
 }  # fmt: skip
 
 
-class TimedContact(NamedTuple):
-    """A contact with its processor time and wall time in s."""
-
-    contact: Contact
-    cpu_s: float
-    wall_s: float
-
-
-def timed_contact(case: Case, grid: int) -> TimedContact:
+def solve_case(case: Case, grid: int) -> Timed[Contact]:
     """Solve a contact and measure its time."""
-    started, began = time.process_time(), time.perf_counter()
-    found = solve(ELASTOMER, case.indenter, case.motion, friction=case.friction, size_mm=SIZE_MM, grid=grid)
-    return TimedContact(found, time.process_time() - started, time.perf_counter() - began)
+    return timed(
+        lambda: solve(
+            ELASTOMER, case.indenter, case.motion, friction=case.friction, size_mm=SIZE_MM, grid=grid
+        )
+    )
 
 
 def contact_row(case: Case, runs: int, markers_mm: Array) -> tuple[object, ...]:
     """The row of ``COLUMNS``."""
     green_kernels.cache_clear()
-    cold = timed_contact(case, GRID)
-    warm_s = min(timed_contact(case, GRID).cpu_s for _ in range(runs))
-    found, fine = cold.contact, timed_contact(case, FINE).contact
+    cold = solve_case(case, GRID)
+    warm_ms = min(solve_case(case, GRID).cpu_ms for _ in range(runs))
+    found, fine = cold.result, solve_case(case, FINE).result
     error_um = 1e3 * np.linalg.norm(found.surface()(markers_mm) - fine.surface()(markers_mm), axis=1)
     force = np.linalg.norm(found.force_n - fine.force_n) / np.linalg.norm(fine.force_n)
     return (
-        case.name, int(found.in_contact.sum()), found.iterations, cold.cpu_s, warm_s, cold.wall_s,
+        case.name, int(found.in_contact.sum()), found.iterations, cold.cpu_ms / 1e3, warm_ms / 1e3, cold.clock_ms / 1e3,
         rms_of(error_um), float(error_um.max()), 100 * float(force),
     )  # fmt: skip
 
@@ -117,6 +111,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("contact", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

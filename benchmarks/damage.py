@@ -147,6 +147,4 @@ def measure(
 
 
 main = Experiment("damage", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

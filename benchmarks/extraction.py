@@ -6,7 +6,6 @@ counted too; ``benchmarks.accuracy`` measures their precision, ``benchmarks.comp
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
@@ -16,6 +15,7 @@ import numpy as np
 from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from benchmarks.suites.scenes import WRONG_SHARE, cached_reference, shortest_edges
 from benchmarks.suites.scoring.wrong import wrong_markers
 from cmpdesign.scene import Camera, render, standard_layout, standard_scene
@@ -48,12 +48,9 @@ def measure_speed(name: str, layers: int, pitch_px: float, size: tuple[int, int]
     layout = standard_layout("honeycomb", layers)
     rendered = render(replace(standard_scene(layout), camera=Camera(pitch_px, rotation_deg=7.3)), size=size)
     extractor = Extractor(cached_reference("honeycomb", layers))
-    total, stages = [], []
-    for _ in range(2 + runs):
-        started = time.perf_counter()
-        markers = extractor.extract(rendered.image)
-        total.append(1e3 * (time.perf_counter() - started))
-        stages.append(markers.timings_ms)
+    read = [timed(lambda: extractor.extract(rendered.image)) for _ in range(2 + runs)]
+    total, stages = [one.clock_ms for one in read], [one.result.timings_ms for one in read]
+    markers = read[-1].result
     true_px = rendered.truth.marker_xy_px
     measured = markers.status == Status.MEASURED
     off = wrong_markers(markers, true_px, WRONG_SHARE * shortest_edges(layout, true_px)).any_kind
@@ -140,6 +137,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("extraction", measure, page)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

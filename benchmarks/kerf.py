@@ -26,6 +26,4 @@ def measure(pictures: int = 200, seed: int = 11) -> Shown:
 
 
 main = Experiment("kerf", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-import time
 import venv
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from scipy.spatial import cKDTree
 
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from cmpdesign.design.design import Design, load_design
 from cmpdesign.layout.build import build_layout
 from cmpdesign.products.laser.as_made import measure_as_made
@@ -89,22 +89,18 @@ def vpype_mm(job: LaserJob, *options: str) -> tuple[float, float]:
                 replace(job_drawing(job), passes=tuple(map(pass_in_layout_order, job.cell_passes)))
             )
         )
-        started = time.perf_counter()
         command = [str(program), "read", str(path), "linesort", *options, "stat"]
-        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-        seconds = time.perf_counter() - started
-    total = [line for line in text.splitlines() if line.strip().startswith("Pen-up length:")][-1]
-    return float(total.split(":")[1]) / PX_IN_MM, seconds
+        done = timed(lambda: subprocess.run(command, check=True, capture_output=True, text=True))
+    lines = done.result.stdout.splitlines()
+    total = [line for line in lines if line.strip().startswith("Pen-up length:")][-1]
+    return float(total.split(":")[1]) / PX_IN_MM, done.clock_ms / 1e3
 
 
 def travel_table() -> Table:
     """vpype's travel and the job's; the job's is at least 12 % shorter."""
     job = make_laser_job(make_design(26, laser__corner="plain", laser__holes="false"))
     entries = [one.cavities.entries_mm for one in job.cell_passes if one.cavities is not None]
-    started = time.perf_counter()
-    for cells in entries:
-        order_cells(cells, "travel")
-    seconds = time.perf_counter() - started
+    seconds = timed(lambda: [order_cells(cells, "travel") for cells in entries]).clock_ms / 1e3
     bound = sum(nearest_bound_mm(cells) for cells in entries)
     plain, plain_s = vpype_mm(job)
     best, best_s = vpype_mm(job, "--two-opt")
@@ -128,9 +124,8 @@ def format_times_table() -> Table:
         for layers, limit in ((26, 3.0), (82, 30.0)):
             design = make_design(layers, laser__machine=str(machine), fiducials__count="3")
             layout = build_layout(design)
-            started, begun = time.perf_counter(), time.process_time()
-            files = prepare_laser(design, layout).make().files
-            wall, seconds = time.perf_counter() - started, time.process_time() - begun
+            made = timed(lambda: prepare_laser(design, layout).make().files)  # noqa: B023
+            files, seconds, wall = made.result, made.cpu_ms / 1e3, made.clock_ms / 1e3
             passes = make_job("", layout, complete_setup(design.laser)).cell_passes
             size = sum(len(content) for content in files.values()) / 1e6
             rows.append((sum(len(one.walls) for one in passes), len(files), size, seconds, wall, limit))
@@ -169,6 +164,4 @@ def measure() -> Shown:
 
 
 main = Experiment("laser", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -21,6 +21,7 @@ import numpy as np
 
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from cmpdesign import build_layout, load
 from cmpdesign.patterns.colors import RED
 from cmpdesign.products.mold.parts import make_parts
@@ -54,13 +55,6 @@ class ProcessFigures(NamedTuple):
     digest: str
 
 
-def time_call(operation: Callable[[], Any]) -> tuple[float, Any]:
-    """Seconds of processor time, and the operation's result."""
-    start = time.process_time()
-    result = operation()
-    return time.process_time() - start, result
-
-
 def red_plate_slab(layers: int) -> Slab:
     """The slab of the boss plate of the red cells."""
     design = load("honeycomb", {"layers": str(layers)})
@@ -75,9 +69,9 @@ def measure_direct(layers: int) -> PlateFigures:
     times = []
 
     def lap(operation: Callable[[], Any]) -> Any:
-        seconds, result = time_call(operation)
-        times.append(seconds)
-        return result
+        done = timed(operation)
+        times.append(done.cpu_ms / 1e3)
+        return done.result
 
     slab = lap(lambda: red_plate_slab(layers))
     solid = lap(lambda: make_slab_solid(slab))
@@ -108,11 +102,11 @@ def measure_boolean(layers: int) -> list[float]:
         fuse.Build()
         return fuse.Shape()
 
-    seconds, shape = time_call(build)
-    checked, _ = time_call(lambda: measure_solid(shape))
-    written, data = time_call(lambda: solid_to_step(NamedSolid("plate", "#c8322d", shape)))
-    read, _ = time_call(lambda: read_step(data))
-    return [seconds, checked, written, read]
+    built = timed(build)
+    checked = timed(lambda: measure_solid(built.result))
+    written = timed(lambda: solid_to_step(NamedSolid("plate", "#c8322d", built.result)))
+    read = timed(lambda: read_step(written.result))
+    return [one.cpu_ms / 1e3 for one in (built, checked, written, read)]
 
 
 def boss_solid(boss: Feature) -> Any:
@@ -175,6 +169,4 @@ def measure(quick: bool = False, large: bool = False) -> Shown:
 
 
 main = Experiment("molds", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -14,9 +14,9 @@ frames in turns: "cpu ms" of the processor, in all threads, and "clock ms". A pa
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import least_in_turns, timed
 from benchmarks.suites.halves import placed_views, rig_of, two_cameras
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.design.design import load_design
@@ -124,11 +125,11 @@ class RestedSensor:
         flat = np.column_stack([xy_mm, np.zeros(len(xy_mm))])
         for seed in range(frames):
             shot = render(replace(shown, seed=seed), size=self.size)
-            begin = time.perf_counter()
-            markers = self.extractor.extract(shot.image)
-            middle = time.perf_counter()
-            shape = self.reconstructor.reconstruct(markers)
-            times.append((middle - begin, time.perf_counter() - middle))
+            extracted = timed(partial(self.extractor.extract, shot.image))
+            markers = extracted.result
+            reconstructed = timed(partial(self.reconstructor.reconstruct, markers))
+            shape = reconstructed.result
+            times.append((extracted.clock_ms, reconstructed.clock_ms))
             true = shot.truth.marker_xyz_mm
             errors.append(shape.xyz_mm - true)
             cov.append(shape.cov_mm2)
@@ -150,7 +151,7 @@ class RestedSensor:
             state, float(known.mean()), found_um, stated_um, image_um, bound_ratio(found_um, stated_um),
             bound_ratio(found_um, image_um), float(np.sqrt(squares.mean())), rms_um(np.concatenate(moved)),
             rms_um(np.concatenate(virtual)), rms_of(tilts),
-            tuple(1e3 * np.median(times, axis=0)),
+            tuple(np.median(times, axis=0)),
         )  # fmt: skip
 
 
@@ -169,7 +170,7 @@ def time_rows(sensor: RestedSensor, rounds: int) -> list[tuple[str, float, float
         for seed, depth in enumerate(depths_mm.tolist())
     ]  # fmt: skip
     images = (shown + shown[-2:0:-1]) * rounds
-    reconstructor, least = sensor.reconstructor, dict[str, tuple[float, float]]()
+    reconstructor = sensor.reconstructor
     markers = [sensor.extractor.extract(image) for image in shown]
     shape, views = reconstructor.reconstruct(markers[0]), reconstructor.poses.views
     side = 0.9 * np.abs(reconstructor.layout.xy_mm).max() * np.linspace(-1.0, 1.0, GRID)
@@ -191,15 +192,7 @@ def time_rows(sensor: RestedSensor, rounds: int) -> list[tuple[str, float, float
         "reconstruct, with virtual markers and all covariances": lambda k: all_of(reconstruct(k)),
         f"field of {GRID} x {GRID} points": lambda k: field.at(shape.displacement_mm, grid_mm),
     }
-    for number in range(len(images)):
-        for name, call in work.items():
-            started = time.process_time(), time.perf_counter()
-            call(number)
-            spent = 1e3 * (time.process_time() - started[0]), 1e3 * (time.perf_counter() - started[1])
-            least[name] = (
-                spent if name not in least else (min(spent[0], least[name][0]), min(spent[1], least[name][1]))
-            )
-    return [(name, *times) for name, times in least.items()]
+    return [(name, *least) for name, least in least_in_turns(work, len(images)).items()]
 
 
 def angles_deg(normals: Array, xy_mm: Array, surface: Surface | None) -> Array:
@@ -242,6 +235,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("reconstruction", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -12,13 +12,14 @@ with which the reference fits the image best. Times are those of sRGB images. On
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from benchmarks.frame.experiment import Experiment, Found, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from benchmarks.suites.halves import two_cameras
 from benchmarks.suites.scanlines import ImageWindow, measure_render_error
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
@@ -72,13 +73,9 @@ def steep_scene(flat: Scene) -> Scene:
 def speed_row(name: str, scene: Scene, repeats: int) -> tuple[str, float, float, float]:
     """Times in ms with the blur and noise of the standard scene, after one picture that is not timed."""
     render(scene, size=SIZE)
-    wall, cpu = [], []
-    for _ in range(repeats):
-        before = time.perf_counter(), time.process_time()
-        render(scene, size=SIZE)
-        wall.append(1e3 * (time.perf_counter() - before[0]))
-        cpu.append(1e3 * (time.process_time() - before[1]))
-    return name, float(np.median(wall)), float(np.percentile(wall, 95)), float(np.median(cpu))
+    runs = [timed(partial(render, scene, size=SIZE)) for _ in range(repeats)]
+    p50, p95 = np.percentile([one.clock_ms for one in runs], (50, 95))
+    return name, float(p50), float(p95), float(np.median([one.cpu_ms for one in runs]))
 
 
 def measure(quick: bool = False) -> Shown:
@@ -110,6 +107,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("rendering", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

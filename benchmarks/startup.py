@@ -12,9 +12,9 @@ import resource
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ import numpy as np
 from benchmarks.frame.conditions import ROOT
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 
 CLI = "from cmpdesign.cli import main; main()"
 COMMANDS = {
@@ -90,11 +91,8 @@ def children_s() -> float:
 def process_row(command: str, runs: int, folder: Path) -> tuple[str, float, float]:
     """A command, and its median and best seconds, after one run that is not timed, which reads the files from disk."""
     arguments = COMMANDS[command]
-    seconds = []
-    for _ in range(runs + 1):
-        start = time.perf_counter()
-        run_python("pass" if arguments is None else CLI, arguments or [], folder)
-        seconds.append(time.perf_counter() - start)
+    run = partial(run_python, "pass" if arguments is None else CLI, arguments or [], folder)
+    seconds = [timed(run).clock_ms / 1e3 for _ in range(runs + 1)]
     return command, float(np.median(seconds[1:])), min(seconds[1:])
 
 
@@ -143,6 +141,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("startup", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -8,9 +8,9 @@ position than to its own. Errors are per axis against the scene's truth. One cor
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from typing import NamedTuple
 
@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from benchmarks.frame.experiment import Experiment, Shown
+from benchmarks.frame.pooled import Columns, Figure, mean, percentile, pooled_table, rms_of, total
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
 from cmpdesign.scene import (
@@ -34,7 +36,7 @@ from cmpdesign.scene import (
     standard_layout,
     standard_scene,
 )
-from extractor import FrameStatus, StartKind, Tracked, Tracker, parse_layout
+from extractor import FrameStatus, StartKind, Tracker, parse_layout
 
 FRAMES, QUICK_FRAMES = 2000, 120
 AHEAD = 40  # frames that are rendered before they are tracked
@@ -45,33 +47,30 @@ SIZE = (640, 480)
 Points = NDArray[np.float64]
 
 
-class TrackedFrame(NamedTuple):
-    """A rendered frame, its tracked markers, and the processor time of tracking in ms."""
+class FollowedFrame(NamedTuple):
+    """One frame: how and in what time it was tracked, and the errors of the tracker and of optical flow.
 
-    rendered: Rendered
-    tracked: Tracked
+    Attributes:
+        start, is_tracked: see ``Tracked``.
+        elapsed_ms, cpu_ms, flow_ms: time of the tracker by the clock and of the processor; of the flow by the clock.
+        squared, flow_squared: mean squared errors per axis, px^2; NaN without markers.
+        worst: largest error, px.
+        lost, wrong, flow_wrong: markers.
+        step_px: the largest motion of a marker since the frame before.
+    """
+
+    start: StartKind | None
+    is_tracked: bool
+    elapsed_ms: float
     cpu_ms: float
-
-
-class FrameErrors(NamedTuple):
-    """Errors of one frame in px and px^2; NaN without markers."""
-
+    flow_ms: float
     squared: float
     worst: float
     lost: int
     wrong: int
     flow_squared: float
     flow_wrong: int
-
-
-class Followed(NamedTuple):
-    """A sequence: errors of its frames, times of the tracker in ms by how it started, and the flow's mean time."""
-
-    rows: list[FrameErrors]
-    times_ms: dict[str, list[float]]
-    not_tracked: int
-    flow_ms: float
-    largest_step_px: float
+    step_px: float
 
 
 def render_sequence(layout: Layout, count: int, jerky: bool) -> Iterator[Rendered]:
@@ -132,94 +131,77 @@ class OpticalFlow:
         return np.asarray(self._points[:, 0], dtype=np.float64)
 
 
-def track_frames(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[TrackedFrame]:
-    """Track frames in groups that are rendered in advance, so that frames follow each other as from a camera."""
-    count = 0
-    while part := list(islice(frames, AHEAD)):
-        found = []
-        for rendered in part:
-            cpu = time.thread_time()
-            frame = tracker.track(np.asarray(rendered.image, np.uint8), time_s=count / 30)
-            found.append(TrackedFrame(rendered, frame, 1e3 * (time.thread_time() - cpu)))
-            count += 1
-        yield from found
+def follow(tracker: Tracker, frames: Iterator[Rendered]) -> Iterator[FollowedFrame]:
+    """Track the frames with the tracker and with optical flow.
 
-
-def follow(tracker: Tracker, frames: Iterator[Rendered]) -> Followed:
-    """Track the frames with the tracker and with optical flow."""
-    rows: list[FrameErrors] = []
-    times: dict[str, list[float]] = {"warm": [], "warm, CPU time": [], "cold": []}
+    Frames are rendered in groups in advance, so that they follow each other as from a camera.
+    """
     flow: OpticalFlow | None = None
-    flow_s, step_px, failed, before = 0.0, 0.0, 0, None
-    for index, (rendered, frame, cpu_ms) in enumerate(track_frames(tracker, frames)):
-        true, image = rendered.truth.marker_xy_px, np.asarray(rendered.image, np.uint8)
-        if frame.start is StartKind.WARM:
-            times["warm"].append(frame.elapsed_ms)
-            times["warm, CPU time"].append(cpu_ms)
-        elif frame.start is StartKind.COLD and index:  # the first frame loads code
-            times["cold"].append(frame.elapsed_ms)
-        failed += frame.status is not FrameStatus.TRACKED
-        flow = flow or OpticalFlow(image, true)
-        start = time.perf_counter()
-        flowed = flow.track(image)
-        flow_s += time.perf_counter() - start
-        rows.append(frame_errors(frame.markers.xy_px, flowed, true))
-        if before is not None:
-            step_px = max(step_px, float(np.linalg.norm(true - before, axis=1).max()))
-        before = true
-    return Followed(rows, times, failed, 1e3 * flow_s / len(rows), step_px)
+    before = None
+    while part := list(islice(frames, AHEAD)):
+        images = [np.asarray(rendered.image, np.uint8) for rendered in part]
+        tracked = [timed(partial(tracker.track, image)) for image in images]
+        for image, rendered, one in zip(images, part, tracked, strict=True):
+            true, xy_px = rendered.truth.marker_xy_px, one.result.markers.xy_px
+            flow = flow or OpticalFlow(image, true)
+            flowed = timed(partial(flow.track, image))
+            error = xy_px - true
+            yield FollowedFrame(
+                one.result.start, one.result.status is FrameStatus.TRACKED, one.result.elapsed_ms, one.cpu_ms,
+                flowed.clock_ms, squared=rms_of(error) ** 2,
+                worst=float(np.sqrt(np.nanmax((error**2).sum(axis=1)))) if np.isfinite(error).any() else np.nan,
+                lost=int((~np.isfinite(error[:, 0])).sum()), wrong=wrong_ids(xy_px, true),
+                flow_squared=rms_of(flowed.result - true) ** 2, flow_wrong=wrong_ids(flowed.result, true),
+                step_px=0.0 if before is None else float(np.linalg.norm(true - before, axis=1).max()),
+            )  # fmt: skip
+            before = true
 
 
-def frame_errors(xy_px: Points, flowed_px: Points, true_px: Points) -> FrameErrors:
-    error = xy_px - true_px
-    squares = error[np.isfinite(error)] ** 2
-    return FrameErrors(
-        squared=float(squares.mean()) if len(squares) else np.nan,
-        worst=float(np.sqrt(np.nanmax((error**2).sum(axis=1)))) if len(squares) else np.nan,
-        lost=int((~np.isfinite(error[:, 0])).sum()),
-        wrong=wrong_ids(xy_px, true_px),
-        flow_squared=float(np.mean((flowed_px - true_px) ** 2)),
-        flow_wrong=wrong_ids(flowed_px, true_px),
-    )
+def _root_of_mean(name: str) -> Figure:
+    return lambda frames: rms_of(np.sqrt([getattr(one, name) for one in frames]))
 
 
-def error_table(name: str, rows: Sequence[FrameErrors]) -> Table:
+ERRORS: Columns = {
+    "RMS px": (".4f", _root_of_mean("squared")),
+    "worst px": (".3f", percentile("worst", 100)),
+    "lost": ("d", total("lost")),
+    "wrong ids": ("d", total("wrong")),
+    "flow: RMS px": (".3f", _root_of_mean("flow_squared")),
+    "flow: wrong ids": ("d", total("flow_wrong")),
+}
+
+
+def error_table(name: str, frames: Sequence[FollowedFrame]) -> Table:
     """Errors by tenths of the sequence: RMS per axis in px and wrong ids, of the tracker and of optical flow."""
-    shown = []
-    for numbers in np.array_split(np.arange(len(rows)), BLOCKS):
-        block = [rows[number] for number in numbers]
-        tracked = [row for row in block if np.isfinite(row.squared)]
-        shown.append((
-            f"{numbers[0]}-{numbers[-1]}", float(np.sqrt(np.mean([row.squared for row in tracked]))),
-            max(row.worst for row in tracked), sum(row.lost for row in block), sum(row.wrong for row in block),
-            float(np.sqrt(np.mean([row.flow_squared for row in block]))), sum(row.flow_wrong for row in block),
-        ))  # fmt: skip
-    halves = ("2nd half / 1st", *(error_growth([row[column] for row in shown]) for column in (1, 5)))
-    columns = {"frames": TEXT, "RMS px": ".4f", "worst px": ".3f", "lost": "d", "wrong ids": "d"}
-    columns |= {"flow: RMS px": ".3f", "flow: wrong ids": "d"}
-    return Table(name, columns, [*shown, (*halves[:2], None, None, None, halves[2], None)])
+    blocks = np.array_split(np.arange(len(frames)), BLOCKS)
+    groups = {f"{part[0]}-{part[-1]}": [frames[number] for number in part] for part in blocks}
+    table = pooled_table(name, "frames", ERRORS, groups)
+    own, flow = (error_growth([row[column] for row in table.rows]) for column in (1, 5))
+    return replace(table, rows=[*table.rows, ("2nd half / 1st", own, None, None, None, flow, None)])
 
 
 def error_growth(rms_px: Sequence[float]) -> float:
     """The RMS of the second half over the RMS of the first half."""
-    halves = np.split(np.square(rms_px), 2)
-    return float(np.sqrt(halves[1].mean() / halves[0].mean()))
+    halves = np.split(np.asarray(rms_px), 2)
+    return rms_of(halves[1]) / rms_of(halves[0])
 
 
-def time_table(name: str, found: Followed) -> Table:
+def time_table(name: str, frames: Sequence[FollowedFrame]) -> Table:
     """Frames and times by how the tracker started."""
-    rows: list[tuple[object, ...]] = []
-    for start, times_ms in found.times_ms.items():
-        percentiles = np.percentile(times_ms, (50, 95, 99)) if len(times_ms) else np.full(3, np.nan)
-        rows.append((start, len(times_ms) + (start == "cold"), *map(float, percentiles)))
-    rows += [
-        ("not tracked", found.not_tracked, *[None] * 3),
-        ("optical flow", len(found.rows), found.flow_ms, *[None] * 2),
-    ]
+    warm, cold = ([one for one in frames if one.start is kind] for kind in (StartKind.WARM, StartKind.COLD))
+    later = [one for one in cold if one is not frames[0]]  # the first frame loads code
+    rows: list[tuple[object, ...]] = [
+        (start, len(every), *(percentile(field, percent)(some) for percent in (50, 95, 99)))
+        for start, every, some, field in (
+            ("warm", warm, warm, "elapsed_ms"), ("warm, CPU time", warm, warm, "cpu_ms"),
+            ("cold", cold, later, "elapsed_ms"),
+        )
+    ]  # fmt: skip
+    rows.append(("not tracked", sum(not one.is_tracked for one in frames), *[None] * 3))
+    rows.append(("optical flow", len(frames), mean("flow_ms")(frames), *[None] * 2))
     columns = {"start": TEXT, "frames": "d", "p50 ms": ".2f", "p95 ms": ".2f", "p99 ms": ".2f"}
-    step = (
-        f"largest step between frames {found.largest_step_px:.1f} px (pitch 20 px); of optical flow the mean"
-    )
+    step_px = max(one.step_px for one in frames)
+    step = f"largest step between frames {step_px:.1f} px (pitch 20 px); of optical flow the mean"
     return Table(f"{name}, times", columns, rows, step)
 
 
@@ -232,12 +214,10 @@ def measure(quick: bool = False) -> Shown:
     count, layout = QUICK_FRAMES if quick else FRAMES, standard_layout(layers=10)
     for name, jerky in (("smooth", False), ("with jumps and black frames", True)):
         tracker = Tracker(parse_layout(layout_to_json(layout)))
-        found = follow(tracker, render_sequence(layout, count, jerky))
-        yield error_table(f"{name}, {count} frames, {len(layout.marker_layer)} markers", found.rows)
-        yield time_table(name, found)
+        frames = list(follow(tracker, render_sequence(layout, count, jerky)))
+        yield error_table(f"{name}, {count} frames, {len(layout.marker_layer)} markers", frames)
+        yield time_table(name, frames)
 
 
 main = Experiment("tracking", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -156,6 +156,4 @@ def measure(
 
 
 main = Experiment("ablation", measure, page, merged, published_options=("rule", "preset", "pictures", "seed"))
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

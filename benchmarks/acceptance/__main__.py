@@ -118,6 +118,4 @@ def measure(
 
 
 main = Experiment("acceptance", measure, page, published_options=("pictures", "seed", "threshold"))
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks.acceptance.points import MAX_LOST, MAX_WRONG, Point
+from benchmarks.frame.plots import png_of, pyplot
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
 
@@ -49,16 +49,13 @@ def page(measured: Mapping[str, Any]) -> Page:
 
 def curve_picture(measured: Mapping[str, Any]) -> bytes:
     """PNG: over the threshold, wrong positions a million with their upper bounds, and lost markers over today's."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    plt = pyplot()
 
     points, own = measured_points(measured), own_point(measured)
     at = [one.threshold for one in points]
     share = [one.wrong_per_million for one in points]
     above = [one.upper_per_million - one.wrong_per_million for one in points]
-    figure, (wrong, lost) = pyplot.subplots(2, 1, sharex=True, figsize=(7.2, 4.4))
+    figure, (wrong, lost) = plt.subplots(2, 1, sharex=True, figsize=(7.2, 4.4))
     wrong.errorbar(at, share, yerr=[[0.0] * len(above), above], fmt="o", color=BLUE, capsize=4, markersize=5)
     wrong.axhline(MAX_WRONG, color=GREY, linestyle="--", linewidth=1)
     wrong.set(ylabel="wrong a million,\n95 % below", ylim=(0, 1.2 * MAX_WRONG))
@@ -73,7 +70,4 @@ def curve_picture(measured: Mapping[str, Any]) -> bytes:
         axis.axvline(own.threshold, color=GREY, linestyle=":", linewidth=1)
         axis.grid(alpha=0.25)
     figure.tight_layout()
-    data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=100, metadata={"Software": None})
-    pyplot.close(figure)
-    return data.getvalue()
+    return png_of(figure)

@@ -23,10 +23,9 @@ from benchmarks.as_made.pads import (
     reference_of,
     sample_contacts,
     sample_pad,
-    shoot_contact,
 )
 from benchmarks.frame.experiment import COMMIT, Experiment, OptionError, Shown
-from benchmarks.frame.pooled import rms_of
+from benchmarks.frame.pooled import joined, rms_of
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.scoring.calibration import COLUMNS, calibration_values, summarise
 from benchmarks.suites.stress.frames import PATTERNS
@@ -54,26 +53,21 @@ def errors_by_row(
             worst = max(worst, float(learnt.picture_z.max()))
             errors[PLACES].append(place_errors(pad, learnt))
             by_name = reference_of(pad.nominal), learnt.layout, reference_of(pad.made)
-            for contact in sample_contacts(pad.made, contacts, rng):
-                pictures = shoot_contact(contact)
+            for pictures in sample_contacts(pad.made, contacts, rng):
                 for preset in PRESETS:
                     for name, layout in zip(LAYOUTS, by_name, strict=True):
-                        found = contact_errors(layout, preset, pictures)
-                        errors[f"{KINDS[0]}: {preset}, {name}"].append(found.displacement)
-                        errors[f"{KINDS[1]}: {preset}, {name}"].append(found.position)
+                        for kind, found in contact_errors(layout, preset, pictures).items():
+                            errors[f"{kind}: {preset}, {name}"].append(found)
     return errors, worst
 
 
 def pooled_rows(errors: Mapping[str, Sequence[Errors]]) -> list[tuple[object, ...]]:
     """One row a name: RMS error per axis in px (places: um), over the bound, and errors over covariances."""
     rows = []
-    for name, of_pictures in errors.items():
-        error = np.concatenate([each.error for each in of_pictures])
-        bound = np.concatenate([each.bound for each in of_pictures])
-        rms = rms_of(error)
-        of_bound = rms / float(np.sqrt(np.nanmean(bound))) if np.isfinite(bound).any() else None
-        stated = calibration_values(summarise([each.squared for each in of_pictures]))
-        rows.append((name, (1e3 if name == PLACES else 1.0) * rms, of_bound, *stated))
+    for name, some in errors.items():
+        rms, bound = rms_of(joined(some, "error")), rms_of(np.sqrt(joined(some, "bound")))
+        stated = calibration_values(summarise([each.squared for each in some]))
+        rows.append((name, (1e3 if name == PLACES else 1.0) * rms, rms / bound, *stated))
     return rows
 
 
@@ -94,6 +88,4 @@ def measure(quick: bool = False, scatter_px: float = 0.2, pads: int = 2, seed: i
 
 
 main = Experiment("as_made", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

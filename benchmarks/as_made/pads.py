@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -45,12 +46,18 @@ class Pad:
     pictures: tuple[Rendered, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """A scene at rest and the same view of the pad in contact. The camera does not move."""
+class BoundedPicture(NamedTuple):
+    """A picture, and the exact bounds of its markers: (M,) mean variance per axis, px^2."""
 
-    rest: Scene
-    pressed: Scene
+    shot: Rendered
+    bound_px2: Points
+
+
+class ContactPictures(NamedTuple):
+    """A pad at rest and in contact. The camera does not move."""
+
+    rest: BoundedPicture
+    pressed: BoundedPicture
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +96,7 @@ def sample_pad(pattern: str, scatter_px: float, pictures: int, rng: np.random.Ge
     return Pad(nominal, made, tuple(shots))
 
 
-def sample_contacts(layout: Layout, count: int, rng: np.random.Generator) -> Iterator[Contact]:
+def sample_contacts(layout: Layout, count: int, rng: np.random.Generator) -> Iterator[ContactPictures]:
     """Contacts that press and twist at a random place; ``rng`` is advanced."""
     for _ in range(count):
         rest = sample_scene(layout, rng)
@@ -99,7 +106,13 @@ def sample_contacts(layout: Layout, count: int, rng: np.random.Generator) -> Ite
             Press(radius, float(rng.uniform(*PRESS_MM)), place),
             Twist(radius, float(rng.uniform(*TWIST_DEG)), place),
         )
-        yield Contact(rest, replace(rest, surface=surface, seed=int(rng.integers(2**31))))
+        pressed = replace(rest, surface=surface, seed=int(rng.integers(2**31)))
+        yield ContactPictures(_shoot(rest), _shoot(pressed))
+
+
+def _shoot(scene: Scene) -> BoundedPicture:
+    bound_px2 = np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE)) / 2
+    return BoundedPicture(render(scene, size=STANDARD_SIZE), bound_px2)
 
 
 def reference_of(layout: Layout) -> Reference:
@@ -123,46 +136,23 @@ def place_errors(pad: Pad, learnt: LearntLayout) -> Errors:
     return Errors(error, squared_distances(error, as_made.covariance_mm2), nothing)
 
 
-@dataclass(frozen=True, eq=False)
-class ContactPictures:
-    """The two pictures of a contact; the exact bounds of the markers, mean variance per axis (M,), of each."""
-
-    rest: Rendered
-    pressed: Rendered
-    rest_bound_px2: Points
-    pressed_bound_px2: Points
-
-
-def shoot_contact(contact: Contact) -> ContactPictures:
-    """Render both pictures."""
-    scenes = contact.rest, contact.pressed
-    shots = (render(scene, size=STANDARD_SIZE) for scene in scenes)
-    bounds = (np.einsum("mii->m", exact_bound(scene, size=STANDARD_SIZE)) / 2 for scene in scenes)
-    return ContactPictures(*shots, *bounds)
-
-
-@dataclass(frozen=True, eq=False)
-class ContactErrors:
-    """Errors, px, of the markers in the picture of the contact, and of their displacements from the picture at rest."""
-
-    position: Errors
-    displacement: Errors
-
-
-def contact_errors(layout: Reference, preset: Preset, pictures: ContactPictures) -> ContactErrors:
-    """Errors of a contact's pictures, read by a layout. The two pictures are independent: covariances add up."""
+def contact_errors(layout: Reference, preset: Preset, pictures: ContactPictures) -> dict[str, Errors]:
+    """Errors, px, of the markers in the picture of the contact ("position"), and of their displacements from the
+    picture at rest. The two pictures are independent: covariances add up.
+    """
     extractor = Extractor(layout, preset)
-    rest, pressed = (extractor.extract(shot.image) for shot in (pictures.rest, pictures.pressed))
-    at_rest = _errors(rest, pictures.rest, pictures.rest_bound_px2)
-    position = _errors(pressed, pictures.pressed, pictures.pressed_bound_px2)
+    rest, pressed = (extractor.extract(picture.shot.image) for picture in pictures)
+    at_rest, position = (_errors(*pair) for pair in zip((rest, pressed), pictures, strict=True))
     error = position.error - at_rest.error
     squared = squared_distances(error, rest.cov_px2 + pressed.cov_px2)
     bound = np.where(np.isfinite(error[:, 0]), at_rest.bound + position.bound, np.nan)
-    return ContactErrors(position, Errors(error, squared, bound))
+    return {"position": position, "displacement": Errors(error, squared, bound)}
 
 
-def _errors(markers: Markers, picture: Rendered, bound_px2: Points) -> Errors:
+def _errors(markers: Markers, picture: BoundedPicture) -> Errors:
     """Errors of the measured markers of a picture."""
-    measured = (markers.status == Status.MEASURED) & picture.truth.visible
-    error = np.where(measured[:, None], markers.xy_px - picture.truth.marker_xy_px, np.nan)
-    return Errors(error, squared_distances(error, markers.cov_px2), np.where(measured, bound_px2, np.nan))
+    truth = picture.shot.truth
+    measured = (markers.status == Status.MEASURED) & truth.visible
+    error = np.where(measured[:, None], markers.xy_px - truth.marker_xy_px, np.nan)
+    bound = np.where(measured, picture.bound_px2, np.nan)
+    return Errors(error, squared_distances(error, markers.cov_px2), bound)

@@ -58,6 +58,4 @@ def measure(
 
 
 main = Experiment("calibration", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

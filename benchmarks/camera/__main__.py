@@ -40,6 +40,4 @@ def measure(
 
 
 main = Experiment("camera", measure, page, published_options=("pictures", "seed", "preset"))
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

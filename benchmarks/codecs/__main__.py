@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from benchmarks.tracking import render_sequence
 from cmpdesign.files.images import to_png
 from cmpdesign.files.layout_json import layout_to_json
@@ -82,10 +83,8 @@ def encode_and_decode(images: Sequence[NDArray[np.uint8]], name: str, folder: Pa
 
 def png_files(images: Sequence[NDArray[np.uint8]]) -> Coded:
     """The frames themselves, with the size of their PNG files."""
-    started = time.perf_counter()
-    sizes = [len(to_png(image)) for image in images]
-    ms = 1e3 * (time.perf_counter() - started) / len(images)
-    return Coded(list(images), sum(sizes) / 1e3 / len(images), ms)
+    sizes = timed(lambda: [len(to_png(image)) for image in images])
+    return Coded(list(images), sum(sizes.result) / 1e3 / len(images), sizes.clock_ms / len(images))
 
 
 def codec_row(
@@ -124,6 +123,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("codecs", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -54,6 +54,4 @@ def measure(quick: bool = False, response: Literal["srgb", "linear"] = "srgb") -
 
 
 main = Experiment("comparison", measure, page)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

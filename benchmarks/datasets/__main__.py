@@ -259,6 +259,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("datasets", measure, page)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -6,9 +6,8 @@ one tests them.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ from benchmarks.force.truth import DEPTHS_MM, FRICTION, TRUTH, YOUNG_MPA, Case, 
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.pooled import rms_of
 from benchmarks.frame.table import TEXT, Table
+from benchmarks.frame.timing import timed
 from cmpdesign import build_layout
 from cmpdesign.contact import Elastomer
 from cmpdesign.contact.finite_block import make_gel
@@ -66,7 +66,9 @@ class Errors(NamedTuple):
     times_ms: tuple[float, float]
 
 
-def errors_of(found: ContactForce, frame: dict[str, Array], name: str, times_ms: list[float]) -> Errors:
+def errors_of(
+    found: ContactForce, frame: dict[str, Array], name: str, times_ms: tuple[float, float]
+) -> Errors:
     """The errors of one frame of the truth."""
     press, error = -float(frame["force_n"][2]), found.force_n - frame["force_n"]
     sigma, torque_sigma = (np.sqrt(np.diag(cov)) for cov in (found.force_cov_n2, found.torque_cov_nmm2))
@@ -98,7 +100,7 @@ def errors_of(found: ContactForce, frame: dict[str, Array], name: str, times_ms:
         utilisation=found.utilisation - float(frame["utilisation"]),
         regions=len(found.regions),
         regions_off=len(found.regions) - (2 if name == "two balls" else 1),
-        times_ms=(times_ms[0], times_ms[1]),
+        times_ms=times_ms,
     )
 
 
@@ -122,13 +124,9 @@ def read_case(
     seen = seen_from(reader_of(case.thickness_mm, case.poisson, depth_mm), far_mm)
     for frame in frames:
         moved = frame["displacement_mm"][DEPTHS_MM.index(depth_mm)].astype(np.float64)
-        times_ms = []
         seen.reader.reset()
-        for _ in range(2):
-            start = time.process_time()
-            found = seen.read(moved, random, lost)
-            times_ms.append(1e3 * (time.process_time() - start))
-        yield errors_of(found, frame, case.name, times_ms)
+        cold, warm = (timed(partial(seen.read, moved, random, lost)) for _ in range(2))
+        yield errors_of(warm.result, frame, case.name, (cold.cpu_ms, warm.cpu_ms))
 
 
 def summary(found: list[Errors]) -> Table:
@@ -217,6 +215,4 @@ def row_of(one: Errors) -> tuple[object, ...]:
 
 
 main = Experiment("force", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -6,9 +6,9 @@ surface is reconstructed as a user does.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from benchmarks.force.__main__ import COLUMNS, MIN_N, Errors, errors_of, reader_
 from benchmarks.force.truth import DEPTHS_MM, TRUTH, Case, cases
 from benchmarks.frame.experiment import Experiment, Shown
 from benchmarks.frame.table import Table
+from benchmarks.frame.timing import timed
 from benchmarks.suites.halves import two_cameras
 from benchmarks.suites.medium.rigs import RandomRig
 from cmpdesign import build_layout
@@ -77,12 +78,8 @@ def read_frames(case: Case, frames: list[dict[str, Array]], seed: int) -> Iterat
         surface = moved_surface(reader.layout.xy_mm, displacement)
         image = render(replace(seeing.scene, surface=surface, seed=seed + k), size=SIZE).image
         shape = reconstructor.reconstruct(seeing.views.extract(image))
-        times_ms = []
-        for _ in range(2):
-            start = time.process_time()
-            found = reader.read_shape(shape)
-            times_ms.append(1e3 * (time.process_time() - start))
-        yield errors_of(found, frame, case.name, times_ms)
+        cold, warm = (timed(partial(reader.read_shape, shape)) for _ in range(2))
+        yield errors_of(warm.result, frame, case.name, (cold.cpu_ms, warm.cpu_ms))
 
 
 def measure(only: tuple[str, ...] = (), seed: int = 1) -> Shown:
@@ -104,6 +101,4 @@ def measure(only: tuple[str, ...] = (), seed: int = 1) -> Shown:
 
 
 main = Experiment("force.pictures", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

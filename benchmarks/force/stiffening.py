@@ -50,10 +50,7 @@ def pressed_states(layer: NeoHookeanLayer, steps: tuple[int, ...], far_mm: Array
     layer.penalty = PENALTY_PER_MODULUS * layer.elastomer.shear_mpa
     still = _linear_matrix(layer)
     upward = layer.basis.get_dofs().all(["u^2"])
-    at = before = np.zeros(n + layer.pressures.N)
-    for step in range(1, max(steps) + 1):
-        guess = 2 * at - before if step > 2 else at
-        before, at = at, layer._solve(guess, step * PRESS_STEP_MM)
+    for step, at in zip(range(1, max(steps) + 1), layer.states(), strict=False):
         if step not in steps:
             continue
         touch = {"press": step * PRESS_STEP_MM, "penalty": layer.penalty, "radius": layer.radius_mm}
@@ -63,30 +60,19 @@ def pressed_states(layer: NeoHookeanLayer, steps: tuple[int, ...], far_mm: Array
         yield Pressed(
             step * PRESS_STEP_MM,
             float(-2 * np.pi * push[upward].sum()),
-            *({depth: _at_depth(layer, x[:n], far_mm, depth) for depth in DEPTHS_MM} for x in (at, linear)),
+            *({depth: layer.displacement(x, far_mm, depth) for depth in DEPTHS_MM} for x in (at, linear)),
         )
 
 
 def _linear_matrix(layer: NeoHookeanLayer) -> object:
     r = np.asarray(layer.basis.global_coordinates())[0]
     unit = np.broadcast_to(np.eye(3)[:, :, None, None], (3, 3, *r.shape))
-    state = {
-        "f": unit,
-        "g": unit,
-        "j": np.ones_like(r),
-        "p": np.zeros_like(r),
-        "mu": layer.elastomer.shear_mpa,
-    }
+    mu = layer.elastomer.shear_mpa
     # of linear elasticity: mu grad u : grad v + mu grad u : grad v^T, which the incompressible layer's p at rest gives
-    state["p"] = np.full_like(r, layer.elastomer.shear_mpa)
+    state = {"f": unit, "g": unit, "j": np.ones_like(r), "p": np.full_like(r, mu), "mu": mu}
     stiffness = neo_hookean._stiffness.assemble(layer.basis, **state)
     coupling = neo_hookean._coupling.assemble(layer.basis, layer.pressures, **state)
     return bmat([[stiffness, coupling.T], [coupling, None]], "csr")
-
-
-def _at_depth(layer: NeoHookeanLayer, u: Array, far_mm: Array, depth_mm: float) -> Array:
-    places = np.stack([far_mm, np.full(len(far_mm), -depth_mm)])
-    return np.asarray(layer.basis.probes(places) @ u).reshape(2, -1)
 
 
 def on_markers(xy_mm: Array, far_mm: Array, moved_mm: Array) -> Array:
@@ -129,6 +115,4 @@ def measure(one_view: float | None = None, seed: int = 1) -> Shown:
 
 
 main = Experiment("force.stiffening", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -146,6 +146,4 @@ def measure(only: tuple[str, ...] = (), out: Path = TRUTH) -> Shown:
 
 
 main = Experiment("force.truth", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

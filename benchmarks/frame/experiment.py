@@ -12,6 +12,7 @@ An experiment is a function of options that yields what is printed, tables and t
         return Found({"rows": ...})
 
     main = Experiment("name", measure)
+    main.run_as(__name__)
 
 Options have the names, types, defaults and meanings of the arguments. ``--json`` writes what is kept and all tables;
 ``--publish`` writes it into docs/measured, and anew what pages show of it.
@@ -81,6 +82,11 @@ class Experiment:
         """What the documentation shows by the present content of docs/measured."""
         measured = read_measured(self.name)
         return self.page(measured) if self.page and measured else Page()
+
+    def run_as(self, module: str) -> None:
+        """Run with the words of the command line if the module of this name is the program, and end."""
+        if module == "__main__":
+            raise SystemExit(self())
 
     def __call__(self, arguments: Sequence[str] | None = None) -> int:
         """Run with words of the command line. Returns the exit code."""

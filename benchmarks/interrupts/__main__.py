@@ -76,6 +76,4 @@ def measure(signals: int = 200, until_ms: float = 250.0, seed: int = 1, quick: b
 
 
 main = Experiment("interrupts", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -110,6 +110,4 @@ def measure() -> Shown:
 
 
 main = Experiment("large_strain", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,17 +120,23 @@ class NeoHookeanLayer:
 
     def pressed(self, presses_mm: tuple[float, ...]) -> Iterator[Moved]:
         """The layer at every one of growing presses."""
-        at = before = np.zeros(self.basis.N + self.pressures.N)
-        steps = 0
+        states, at, step = self.states(), np.empty(0), 0
         for wanted in presses_mm:
-            while steps * PRESS_STEP_MM < wanted - 1e-9:
-                steps += 1
-                guess = 2 * at - before if steps > 2 else at
-                before, at = at, self._solve(guess, steps * PRESS_STEP_MM)
-            yield Moved(self._displacement(at, 0.0), self._displacement(at, self.elastomer.marker_depth_mm))
+            while step * PRESS_STEP_MM < wanted - 1e-9:
+                step, at = step + 1, next(states)
+            depths_mm = 0.0, self.elastomer.marker_depth_mm
+            yield Moved(*(self.displacement(at, places_mm(), depth_mm) for depth_mm in depths_mm))
 
-    def _displacement(self, at: Array, depth_mm: float) -> Array:
-        places = np.stack([places_mm(), np.full(len(places_mm()), -max(depth_mm, 1e-9))])
+    def states(self) -> Iterator[Array]:
+        """The unknowns at presses that grow by ``PRESS_STEP_MM``."""
+        at = before = np.zeros(self.basis.N + self.pressures.N)
+        for step in count(1):
+            before, at = at, self._solve(2 * at - before if step > 2 else at, step * PRESS_STEP_MM)
+            yield at
+
+    def displacement(self, at: Array, away_mm: Array, depth_mm: float) -> Array:
+        """(2, N) mm in r and z of points at distances from the axis, at a depth."""
+        places = np.stack([away_mm, np.full(len(away_mm), -max(depth_mm, 1e-9))])
         return np.asarray(self.basis.probes(places) @ at[: self.basis.N]).reshape(2, -1)
 
     def _solve(self, at: Array, press_mm: float) -> Array:

@@ -12,7 +12,6 @@ tests/support/calibration, are fitted beside ``cv2.calibrateCamera``.
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -24,8 +23,8 @@ from numpy.typing import NDArray
 
 import cmpdesign
 from benchmarks.frame.experiment import Experiment, Found, Shown
-from benchmarks.frame.pooled import rms_of
-from benchmarks.frame.table import Table
+from benchmarks.frame.pooled import pooled_table, rms_of
+from benchmarks.frame.timing import timed
 from benchmarks.suites.lenses.boards import board_error_px, by_opencv
 from benchmarks.suites.lenses.cameras import SIZE_PX, random_camera
 from benchmarks.suites.lenses.pictures import BAD_KINDS, Conditions, take_pictures, to_view
@@ -34,7 +33,6 @@ from benchmarks.suites.lenses.scoring import (
     CameraFigures,
     model_ratio,
     parameters_z,
-    pooled_row,
     rays_z,
     seen_pixels,
 )
@@ -66,9 +64,8 @@ def calibrate_one(condition: str, seed: int, number: int, chessboards: bool) -> 
         taken = replace(taken, bad=tuple(bad.items()))
     layout = standard_layout(layers=10)
     pictures = take_pictures(camera, layout, PICTURES, taken, rng)
-    begin = time.process_time()
-    found = cmpdesign.calibrate_camera(layout, pictures).found
-    cpu_s = time.process_time() - begin
+    calibrated = timed(lambda: cmpdesign.calibrate_camera(layout, pictures).found)
+    found = calibrated.result
     true = to_view(camera.pinhole)
     refused = {number for number, one in enumerate(found.pictures) if not one.used}
     seen = seen_pixels([one.xy_px for one in found.adjusted.problem.sightings])
@@ -91,7 +88,7 @@ def calibrate_one(condition: str, seed: int, number: int, chessboards: bool) -> 
         bad=len(bad),
         good_refused=len(refused - set(bad)),
         board_px=board_px,
-        cpu_s=cpu_s,
+        cpu_s=calibrated.cpu_ms / 1e3,
     )
 
 
@@ -181,22 +178,14 @@ def measure(
     if corners:
         yield corners_text(Path(corners))
         return Found()
-    rows, kept = [], []
+    groups: dict[str, list[CameraFigures]] = {}
     for name in (condition,) if condition else CONDITIONS:
         found = [calibrate_one(name, seed, number, chessboards) for number in range(cameras)]
-        kept += found
-        narrow = [row for row in found if row.field_deg <= WIDE_DEG]
-        wide = [row for row in found if row.field_deg > WIDE_DEG]
-        rows += [
-            pooled_row(f"{name}, {field}", some)
-            for field, some in (("to 100 degrees", narrow), ("beyond", wide))
-            if some
-        ]
-    yield Table("rays", COLUMNS, rows)
-    return Found({"cameras": [asdict(row) for row in kept]})
+        groups[f"{name}, to 100 degrees"] = [row for row in found if row.field_deg <= WIDE_DEG]
+        groups[f"{name}, beyond"] = [row for row in found if row.field_deg > WIDE_DEG]
+    yield pooled_table("rays", "condition", COLUMNS, groups)
+    return Found({"cameras": [asdict(row) for rows in groups.values() for row in rows]})
 
 
 main = Experiment("lenses", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -156,6 +156,4 @@ def measure(quick: bool = False) -> Shown:
 
 
 main = Experiment("live", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

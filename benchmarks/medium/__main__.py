@@ -73,6 +73,4 @@ def measure(quick: bool = False, seed: int = 0) -> Shown:
 
 
 main = Experiment("medium", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -121,6 +121,4 @@ def measure() -> Shown:
 
 
 main = Experiment("numbering", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -95,6 +95,4 @@ def times_table(readings: int) -> Table:
 
 
 main = Experiment("pad_codes", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

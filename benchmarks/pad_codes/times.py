@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 from typing import NamedTuple
 
 import cv2
 
+from benchmarks.frame.timing import least_in_turns
 from benchmarks.pad_codes.families import coded_layout
 from cmpdesign.scene import Camera, Optics, Scene, Sensor, render
 from extractor import Extractor
@@ -27,16 +28,13 @@ CODE, ROTATION_DEG, BLUR_SHARE = 7, 7.3, 0.05  # blur as a share of the edges
 def least_ms(case: Case, readings: int) -> tuple[float, float]:
     """Of the plain pad, and of the coded one; one thread."""
     cv2.setNumThreads(1)
-    readers, images, least = [], [], [float("inf")] * 2
-    for code in (0, CODE):
+
+    def reading(code: int) -> Callable[[int], object]:
         layout = coded_layout(case.layers, code)
         camera, optics = Camera(case.pitch_px, ROTATION_DEG), Optics(BLUR_SHARE * case.pitch_px)
         scene = Scene(layout, camera, optics=optics, sensor=Sensor(noise=2.0), seed=3)
-        images.append(render(scene, size=case.size).image)
-        readers.append(Extractor(layout.reference()))
-    for _ in range(readings):
-        for k in (0, 1):
-            started = time.process_time()
-            readers[k].extract(images[k])
-            least[k] = min(least[k], 1e3 * (time.process_time() - started))
-    return least[0], least[1]
+        image, reader = render(scene, size=case.size).image, Extractor(layout.reference())
+        return lambda _: reader.extract(image)
+
+    least = least_in_turns({"plain": reading(0), "coded": reading(CODE)}, readings)
+    return least["plain"].cpu_ms, least["coded"].cpu_ms

@@ -142,6 +142,4 @@ def measure(
 
 
 main = Experiment("photoreal", measure, page)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -160,6 +160,4 @@ def measure(sensors: int = 60, seed: int = 0) -> Shown:
 
 
 main = Experiment("rig", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

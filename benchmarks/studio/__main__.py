@@ -82,6 +82,4 @@ def page(results: dict[str, Any]) -> Page:
 
 
 main = Experiment("studio", measure, page)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -51,6 +51,4 @@ def measure(quick: bool = False, processes: int = PROCESSES) -> Shown:
 
 
 main = Experiment("sweeps", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

@@ -51,6 +51,4 @@ def measure(views: int = 300, seed: int = COMMIT, processes: int = PROCESSES) ->
 
 
 main = Experiment("views", measure)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+main.run_as(__name__)

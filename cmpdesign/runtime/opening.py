@@ -64,12 +64,19 @@ class Sensors:
 
         Raises:
             LateError: a sensor has none within this time.
+            CmpDesignError: a time that is no number of seconds.
         """
         end_s = time.monotonic() + timeout_s
+        last = {one.name: -1 if after is None else after.frames[one.name].index for one in self}
         for sensor in self:
-            last = -1 if after is None else after.frames[sensor.name].index
-            sensor.wait(last, max(end_s - time.monotonic(), 0.0))
-        return self._paired()
+            sensor.wait(last[sensor.name], max(end_s - time.monotonic(), 0.0))
+        while True:
+            found = self._paired()
+            if all(one.index > last[one.name] for one in found):
+                return found
+            # a sensor that is behind the others keeps them at their former results
+            behind = min(self, key=lambda one: one.results[-1].taken_s)
+            behind.wait(behind.results[-1].index, max(end_s - time.monotonic(), 0.0))
 
     def zero(self, check: bool = True) -> None:
         """Zero all sensors, see ``Sensor.zero``; the first that refuses ends the call."""

@@ -50,7 +50,7 @@ class SensorPlan:
         file: the sensor file.
         layout: the pad; without virtual markers, if these are not wanted.
         contact: reads forces; None: not wanted.
-        has_shape: the surface is wanted.
+        has_shape: the surface is read, as that of several views is.
         cameras: one for all views, or one for each.
     """
 
@@ -88,13 +88,14 @@ class SensorPlan:
             PoseError: views that cannot be placed by the markers at rest.
         """
         from extractor import Reconstructor, ShapeTracker, Tracker
+        from extractor.space.views import side_shown
 
         response = cast(Any, self.file.table.response)
         if self.has_shape:
             reconstructor = Reconstructor(self.layout, self.file.rig, rest)
             return ShapeTracker(reconstructor, response=response, contact=self.contact)
-        alone = None if rest is None else rest[0]
-        tracker = Tracker(self.layout, rest=alone, response=response)
+        alone, side = None if rest is None else rest[0], side_shown(self.layout, self.file.rig.views[0])
+        tracker = Tracker(self.layout, rest=alone, response=response, side=side)
         if self.contact is None:
             return tracker
         return contact_tracker(tracker, self.file.path, self.contact, alone)
@@ -135,13 +136,12 @@ def plan_of(file: SensorFile, outputs: Iterable[str] | None) -> SensorPlan:
     file.require_layout(layout)
     if "virtual" not in wanted:
         layout = replace(layout, virtual_per_edge=0)
-    has_shape = "shape" in wanted or (gel is not None and views > 1)
     return SensorPlan(
         file.path.stem,
         file,
         layout,
         None if gel is None else contact_reader(gel, file.path, layout),
-        has_shape,
+        views > 1,
         _cameras(file, views),
     )
 

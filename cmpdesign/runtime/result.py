@@ -65,7 +65,7 @@ class SensorFrame:
 
     @property
     def shape(self) -> Shape | None:
-        """The surface; None if it is not wanted."""
+        """The surface; of several views always, since their markers come with it, else None."""
         return getattr(self.tracked, "shape", None)
 
     @property
@@ -76,7 +76,7 @@ class SensorFrame:
 
 @dataclass(frozen=True, eq=False)
 class SensorFrames:
-    """Results of several sensors that belong together by time, also as attributes.
+    """Results of several sensors that belong together by time, also as attributes. Can be pickled.
 
     Attributes:
         frames: sensor -> result.
@@ -87,11 +87,10 @@ class SensorFrames:
     offsets_ms: Mapping[str, float]
 
     def __getattr__(self, name: str) -> SensorFrame:
-        if name.startswith("_") or name not in self.frames:
-            raise AttributeError(
-                f"there is no sensor {name!r}; there are {', '.join(self.__dict__['frames'])}"
-            )
-        return self.frames[name]
+        frames = self.__dict__.get("frames", {})  # empty while a pickle is read
+        if name.startswith("_") or name not in frames:
+            raise AttributeError(f"there is no sensor {name!r}; there are {', '.join(frames)}")
+        return cast("SensorFrame", frames[name])
 
     def __iter__(self) -> Iterator[SensorFrame]:
         return iter(self.frames.values())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from threading import Condition, Event, Thread
+from threading import TIMEOUT_MAX, Condition, Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from cmpdesign.errors import CmpDesignError
@@ -65,6 +65,7 @@ class Sensor:
         self._told = ToldAdvice()
         self.tracker: Tracker | ContactTracker | ShapeTracker | None = None
         self._rest: AtRest | None = None
+        self._zeros = 0
         self._closing, self._failure = Event(), ""
         table, self._cameras = plan.file.table, list[Camera]()
         try:
@@ -130,7 +131,12 @@ class Sensor:
 
         Raises:
             LateError: no such result within this time.
+            CmpDesignError: a time that is no number of seconds.
         """
+        if not isinstance(timeout_s, int | float) or not timeout_s <= TIMEOUT_MAX:
+            raise CmpDesignError(
+                f"timeout_s is {timeout_s}; give the longest wait, at most {TIMEOUT_MAX:.0f} s"
+            )
 
         def is_there() -> bool:
             return self._closing.is_set() or bool(self._results and self._results[-1].index > after)
@@ -145,7 +151,8 @@ class Sensor:
         """Take the mean of the next frames as the rest frame, from which displacement, shape and force count.
 
         Light and focus of these frames are those that ``health`` expects from now on, and markers that they do not
-        show, as behind a scratch, are not expected any more.
+        show, as behind a scratch, are not expected any more. When the call returns, results count from the new rest
+        frame.
 
         Args:
             check: refuse a pattern that is bent against the former rest frame; False: after the start under load.
@@ -154,16 +161,21 @@ class Sensor:
             TouchedError: the pattern moves, is touched or not seen; the rest frame is the former one.
             LateError: no frames come.
         """
-        frames = [self.wait()]
+        last, frames = self.wait().index, list[SensorFrame]()
         while len(frames) < ZERO_FRAMES:
-            frames.append(self.wait(frames[-1].index, ZERO_WAIT_S))
+            frames.append(self.wait(last, ZERO_WAIT_S))
+            last = frames[-1].index
         before = self._rest.markers if check and self._rest is not None else None
         layout, limits = self.plan.layout, self.plan.file.table.limits
         rest = rest_markers(frames, before, layout, limits.max_rest_error_px)
         tracker = self.plan.tracker(rest)
         with self._changed:
             past = [one for one in self._past if one.number >= frames[0].index]
-        self._rest, self.tracker = AtRest.of(rest, past, layout, limits), tracker
+        at_rest = AtRest.of(rest, past, layout, limits)
+        with self._changed:
+            self._rest, self.tracker, last = at_rest, tracker, self._results[-1].index
+            self._zeros += 1
+        self.wait(last, ZERO_WAIT_S)
 
     def close(self) -> None:
         """End all threads; a driver that does not return is left alone."""
@@ -188,18 +200,21 @@ class Sensor:
                 frames = self._next(last)
                 if frames is None:
                     continue
-                last = frames[0].number
+                last, zeros = frames[0].number, self._zeros
                 result = self._read(frames, last - dropped_before - 1, self._log.since(events))
                 past = past_of(result, frames[0].image, self._rest)
                 if self._rest is None and result.views and all(view.markers.found for view in result.views):
                     markers, limits = [view.markers for view in result.views], self.plan.file.table.limits
                     self._rest = AtRest.of(markers, [past], self.plan.layout, limits)
-                dropped_before, events = last, events + len(result.events)
                 with self._changed:
+                    if self._zeros != zeros:  # it counts from the former rest frame
+                        last = dropped_before
+                        continue
                     self._results.append(result)
                     self.count += 1
                     self._past.append(past)
                     self._changed.notify_all()
+                dropped_before, events = last, events + len(result.events)
                 if self.count % EVERY_FRAMES == 0:
                     for advice in self._told.new(self._health(ADVISED_FRAMES).advice):
                         self._log.add(EventKind.HEALTH, "", advice)

@@ -10,10 +10,12 @@ not add stray loads.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import contact as native
 from extractor.contact.gel import Gel
 
 Array = NDArray[np.float64]
@@ -62,6 +64,22 @@ class Solution:
     inverse: Array
     chi: float
     largest_gain: float
+
+
+class Settled(NamedTuple):
+    """Of the S given loads those that press, K.
+
+    Attributes:
+        kept: (K,) their places among the given ones.
+        traction: (K, 3) in Young's moduli.
+        inverse: (3 K, 3 K) their covariance by the noise.
+        residual: (R,) whitened.
+    """
+
+    kept: Ids
+    traction: Array
+    inverse: Array
+    residual: Array
 
 
 class TractionSolver:
@@ -151,14 +169,14 @@ class TractionSolver:
     def _gains(self, white: Array, whitening: Array, curvature: Array) -> Array:
         """(K,) the decrease of the sum's root by one more load's pressure; 0 where a suction would decrease it."""
         back = np.einsum("mij,mi->mj", whitening, white).reshape(-1).astype(np.float32)
-        return np.asarray(np.maximum(self._press @ back, 0.0) / np.sqrt(curvature))
+        return np.asarray(np.maximum(times(self._press, back), 0.0) / np.sqrt(curvature))
 
     def _cold_start(self, measured: Array) -> Ids:
         """Loads that press after a projected gradient of pressure alone, one load a marker (Nesterov 1983)."""
-        right = self._press[self._coarse] @ measured.reshape(-1).astype(np.float32)
+        right = times(self._press[self._coarse], measured.reshape(-1).astype(np.float32))
         at = ahead = np.zeros(len(right))
         for k in range(self._limits.descents):
-            after = np.maximum(ahead + self._coarse_step * (right - self._coarse_gram @ ahead), 0.0)
+            after = np.maximum(ahead + self._coarse_step * (right - times(self._coarse_gram, ahead)), 0.0)
             ahead = after + k / (k + 3) * (after - at)
             at = after
         seeds = self._coarse[at > self._limits.seed_share * at.max()]
@@ -167,29 +185,31 @@ class TractionSolver:
 
     def _settle(self, white: Array, whitening: Array, support: Ids) -> tuple[Ids, Array, Array, Array]:
         """The support without loads that would pull, their tractions, covariance, and the whitened residual."""
-        blocks = np.einsum(
-            "mij,smaj->mias",
-            whitening,
-            self._by_load[support].reshape(len(support), 3, -1, self._axes).transpose(0, 2, 1, 3),
-            optimize=True,
-        )
-        columns = blocks.reshape(white.size, 3, len(support)).transpose(0, 2, 1).reshape(white.size, -1)
-        gram = columns.T @ columns
-        gram[np.diag_indices_from(gram)] += self._limits.tau**-2
-        right = columns.T @ white.reshape(-1)
-        kept = np.arange(len(support))
-        while len(kept):
-            rows = (3 * kept[:, None] + np.arange(3)).ravel()
-            part = gram[np.ix_(rows, rows)]
-            traction = np.linalg.solve(part, right[rows]).reshape(-1, 3)
-            pulls = traction[:, 2] >= 0
-            if not pulls.any():
-                break
-            kept = kept[~pulls]
-        if not len(kept):
-            return support[:0], np.empty((0, 3)), np.empty((0, 0)), white
-        residual = white.reshape(-1) - columns[:, rows] @ traction.reshape(-1)
-        return support[kept], traction, np.linalg.inv(part), residual.reshape(white.shape)
+        found = settled(self._by_load[support], whitening, white.reshape(-1), self._limits.tau**-2)
+        return support[found.kept], found.traction, found.inverse, found.residual.reshape(white.shape)
+
+
+def settled(by_load: NDArray[np.float32], whitening: Array, white: Array, information: float) -> Settled:
+    """The tractions that minimise |white - W A t|^2 + information |t|^2, of the loads that press.
+
+    Loads that pull leave together, until all press. Everything runs in the thread of the caller, see ``times``.
+
+    Args:
+        by_load: (S, 3, R) the measured numbers by the traction of a load.
+        whitening: (M, C, C), with M C = R.
+        white: (R,) whitened numbers.
+        information: of a traction before the measurement.
+    """
+    return native.settle(by_load, whitening, white, information)
+
+
+def times(matrix: NDArray[Any], vector: NDArray[Any]) -> NDArray[Any]:
+    """A matrix (R, C) times a vector (C,), or times each row of (N, C), in the thread of the caller.
+
+    The operator @ wakes the threads of linear algebra for a matrix of this size. They wait for their next product by
+    computing, for 30 to 100 ms: frame after frame that is a second core.
+    """
+    return np.asarray(np.einsum("rc,...c->...r", matrix, vector))
 
 
 def _neighbours(loads_mm: Array, spacing_mm: float) -> Ids:

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor.contact.active_set import LIMITS, Solution, TractionSolver
+from extractor.contact.active_set import LIMITS, Solution, TractionSolver, times
 from extractor.contact.gel import Gel
 from extractor.contact.regions import AREA_ERROR, HERTZ, Patch, find_patches
 from extractor.contact.result import ContactForce, ContactReason, Region
@@ -228,13 +228,13 @@ class ContactReader:
         width = SMOOTH_SPACINGS * self.gel.spacing_mm
         loads = self.gel.loads_mm
         return np.asarray(
-            (self.gel.width_mm / width) ** 2 * _gaussians(loads, loads[support], width) @ peak_mpa
+            (self.gel.width_mm / width) ** 2 * times(_gaussians(loads, loads[support], width), peak_mpa)
         )
 
     def _places(self, solution: Solution) -> Array:
         """(S, 3) places of the loads after the displacement by themselves, at the depth of the markers."""
         loads, columns = self.gel.loads_mm[solution.support], solution.support[:, None] * 3 + np.arange(3)
-        moved = (self.gel.matrix[:, columns.ravel()] @ solution.traction.ravel()).reshape(-1, 3)
+        moved = times(self.gel.matrix[:, columns.ravel()], solution.traction.ravel()).reshape(-1, 3)
         weight = _gaussians(loads, self.layout.xy_mm, self.gel.spacing_mm)
         mean = weight @ moved / weight.sum(axis=1, keepdims=True)
         return np.asarray(np.pad(loads, [(0, 0), (0, 1)]) + mean)

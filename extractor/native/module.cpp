@@ -9,6 +9,10 @@ namespace cmp::complete {
 void add_complete(nb::module_ module);
 }  // namespace cmp::complete
 
+namespace cmp::contact {
+void add_contact(nb::module_ module);
+}  // namespace cmp::contact
+
 namespace cmp::image {
 void add_image(nb::module_ module);
 }  // namespace cmp::image
@@ -57,6 +61,7 @@ NB_MODULE(_native, module) {
   cmp::refine::add_synthesis(module.def_submodule("synthesis"));
   cmp::refine::add_solve(module.def_submodule("solve"));
   cmp::complete::add_complete(module.def_submodule("complete"));
+  cmp::contact::add_contact(module.def_submodule("contact"));
   cmp::space::add_space(module.def_submodule("space"));
   cmp::track::add_track(module.def_submodule("track"));
 }

@@ -69,7 +69,7 @@ def _images_by_view(image: Image | Sequence[Image | None] | None, rig: Rig) -> l
     return list(image)
 
 
-def _side_shown(layout: Reference, view: View, side: Side) -> Side:
+def side_shown(layout: Reference, view: View, side: Side = "designed") -> Side:
     """The apparent side of a view's picture, for an ``Extractor``: by its pose, else by side and mirrors."""
     expected = is_mirrored(layout, side)
     if expected is None:
@@ -104,7 +104,7 @@ class ViewExtractor:
     ) -> None:
         layout = layout_of(layout)
         self.layout, self.rig = layout, rig
-        self._sides = [_side_shown(layout, view, side) for view in rig.views]
+        self._sides = [side_shown(layout, view, side) for view in rig.views]
         self._extractors = {
             shown: Extractor(layout, preset, response, shown, channels)
             for shown in dict.fromkeys(self._sides)
@@ -184,7 +184,7 @@ class ShapeTracker:
         layout = reconstructor.layout
         most = min(len(reconstructor.rig.views), available_cores()) if threads is None else threads
         self._threads = Threads(most)
-        sides = [_side_shown(layout, view, "designed") for view in reconstructor.poses.views]
+        sides = [side_shown(layout, view) for view in reconstructor.poses.views]
         self._trackers = [
             Tracker(layout, warm=warm, preset=preset, response=response, side=side, channels=channels)
             for side in sides

@@ -15,7 +15,12 @@ import numpy as np
 
 from benchmarks.suites.calibration.cases import CalibrationCase
 from benchmarks.suites.scenes import standard_layout
-from benchmarks.suites.stress.damage import missing_cell_clusters, white_elsewhere, white_neighbours_missing
+from benchmarks.suites.stress.damage import (
+    band,
+    missing_cell_clusters,
+    white_elsewhere,
+    white_neighbours_missing,
+)
 from benchmarks.suites.stress.empty import EMPTY_KINDS
 from benchmarks.suites.stress.frames import PATTERNS, CaseImage, EmptyFrame, PatternFrame, plain_frame
 from benchmarks.suites.stress.random_damage import (
@@ -26,7 +31,6 @@ from benchmarks.suites.stress.random_damage import (
 )
 from benchmarks.suites.stress.surroundings import other_pattern_name, pattern_behind, second_pattern_beside
 from cmpdesign.patterns.colors import BLACK, WHITE
-from cmpdesign.scene import Scratch
 
 LAYERS, LARGE_LAYERS, LARGE_PITCH_PX = 11, 60, 9.0
 LARGE_SIZE = (1200, 1050)
@@ -78,15 +82,11 @@ def before_a_tiling(frame: PatternFrame, rng: Rng) -> PatternFrame:
 
 def cut_in_parts(frame: PatternFrame, rng: Rng) -> PatternFrame:
     """Black bands as wide as one or two cells cut the pattern, around the white cell as well."""
-    reach, bands = max(frame.layout.size_mm), []
-    start = rng.uniform(0, np.pi)
+    reach, start, bands = max(frame.layout.size_mm), rng.uniform(0, np.pi), []
     for k in range(int(rng.integers(2, 5))):
         turn = start + k * np.pi / 3 + rng.normal(0, 0.05)
-        along, normal = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-        middle = normal * rng.uniform(1, 0.3 * reach)
-        ends = [middle - reach * along, middle + reach * along]
-        (ax, ay), (bx, by) = (end.tolist() for end in ends)
-        bands.append(Scratch((ax, ay), (bx, by), float(rng.uniform(0.5, 2.2)), (20.0, 20.0, 20.0)))
+        offset_mm, width_mm = rng.uniform(1, 0.3 * reach), float(rng.uniform(0.5, 2.2))
+        bands.append(band(frame, turn, offset_mm, width_mm, (20.0, 20.0, 20.0)))
     return sample_deformed(frame.damaged(scratches=tuple(bands)), rng)
 
 

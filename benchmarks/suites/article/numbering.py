@@ -6,7 +6,6 @@ Plain Python, not optimised.
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -41,20 +40,6 @@ class LatticeTables(NamedTuple):
     cell_of: NDArray[np.int32]
 
 
-class SpinGraph(NamedTuple):
-    """A graph of corners for the search.
-
-    Attributes:
-        node_of_corner: (T, 3) int32, the node of each triangle's corners.
-        corner_of_node: (N, 3) int32 by ink: 3 * triangle + corner, or -1.
-        sense: 1 from the front, -1 mirrored.
-    """
-
-    node_of_corner: NDArray[np.int32]
-    corner_of_node: NDArray[np.int32]
-    sense: int
-
-
 class SpinResult(NamedTuple):
     """The result of one search.
 
@@ -80,23 +65,16 @@ class NumberedTriangles(NamedTuple):
     conflicts: int
 
 
-@dataclass(frozen=True, eq=False)
-class Numbering:
+class Numbering(NamedTuple):
     """The result of stage 7.
 
     Attributes:
         marker_of_corner: (T, 3) int32, the marker at each corner of each triangle, or -1.
         cell_of_triangle: (T,) int32, the layout's cell of each triangle, or -1.
-        white_px: (2,) the centre of the white cell, or NaN.
-        conflicts: nodes that were split because their neighbours gave them different numbers.
-        ambiguous: two white cells fit the reference equally well.
     """
 
     marker_of_corner: NDArray[np.int32]
     cell_of_triangle: NDArray[np.int32]
-    white_px: NDArray[np.float64]
-    conflicts: int
-    ambiguous: bool
 
 
 def make_lattice_tables(reference: Reference) -> LatticeTables:
@@ -108,6 +86,11 @@ def make_lattice_tables(reference: Reference) -> LatticeTables:
     lower_left = np.argmin((q + r)[corners], axis=1)
     cell_of[corners[np.arange(len(inked)), lower_left]] = inked
     return LatticeTables(layers=int(reference.layer.max()), cell_of=cell_of)
+
+
+def _sense(graph: CornerGraph) -> int:
+    """1 from the front, -1 mirrored."""
+    return -1 if graph.mirrored else 1
 
 
 class Gaps(NamedTuple):
@@ -154,7 +137,9 @@ def _patch_level(image: NDArray[np.uint8], place: NDArray[np.float64], radius: f
     return float(color.sum()) if is_inside else np.nan
 
 
-def _spin_search(start: int, axial: tuple[int, int], graph: SpinGraph, lattice: LatticeTables) -> SpinResult:
+def _spin_search(
+    start: int, axial: tuple[int, int], graph: CornerGraph, lattice: LatticeTables
+) -> SpinResult:
     """Number triangles outward from one node, the smallest id first.
 
     At a marker with the color phase (q - r) mod 3 the ink of a triangle determines which of the three cells around the
@@ -172,7 +157,7 @@ def _spin_search(start: int, axial: tuple[int, int], graph: SpinGraph, lattice: 
     marker = np.full(graph.node_of_corner.shape, -1, np.int32)
     cell = np.full(len(node_of_corner), -1, np.int32)
     bad = np.zeros(len(corner_of_node), np.bool_)
-    outside = 0
+    outside, sense = 0, _sense(graph)
     triangle_of: dict[int, int] = {}  # by up-cell
     axial_of = {start: axial}  # by node
     heap = [(marker_id(*axial), start)]  # the smallest marker id first
@@ -200,7 +185,7 @@ def _spin_search(start: int, axial: tuple[int, int], graph: SpinGraph, lattice: 
             cell[t], triangle_of[up] = cell_of[up], t
             for j in range(3):
                 # Clockwise the roles are 0, 2, 1.
-                at = (role - graph.sense * j) % 3
+                at = (role - sense * j) % 3
                 place, corner = (cq + (at == 1), cr + (at == 2)), (k + j) % 3
                 marker[t, corner] = marker_id(*place)
                 other = node_of_corner[t][corner]
@@ -237,11 +222,9 @@ def _number_from(
     graph: CornerGraph, lattice: LatticeTables, node: int, coordinate: NDArray[np.int32]
 ) -> NumberedTriangles:
     """Number from one node. Nodes with contradictions are split, and the search is repeated."""
-    sense = -1 if graph.mirrored else 1
     conflicts = 0
     for _ in range(MAX_ROUNDS):
-        spin_graph = SpinGraph(graph.node_of_corner, graph.corner_of_node, sense)
-        found = _spin_search(node, (int(coordinate[0]), int(coordinate[1])), spin_graph, lattice)
+        found = _spin_search(node, (int(coordinate[0]), int(coordinate[1])), graph, lattice)
         if not found.bad.any():
             return NumberedTriangles(found.marker, found.cell, found.outside, conflicts)
         conflicts += int(found.bad.sum())
@@ -259,10 +242,9 @@ def number_triangles(
     """Stage 7: number every triangle that is connected with the white cell; None without a white cell.
 
     A bright gap between cells is a candidate of the white cell. The candidate with the most cells inside the layout's
-    outline and the fewest outside is used. The result is ambiguous if two candidates are equal.
+    outline and the fewest outside is used. Nothing is numbered if two candidates are equal.
     """
-    sense = -1 if graph.mirrored else 1
-    ratio, centre = _measure_gaps(image, triangles.corner_px, graph.corner_of_node, sense)
+    ratio, centre = _measure_gaps(image, triangles.corner_px, graph.corner_of_node, _sense(graph))
     bright = np.argwhere(ratio > MIN_WHITE_RATIO)
     bright = bright[np.argsort(-ratio[bright[:, 0], bright[:, 1]], kind="stable")][: 3 * MAX_WHITES]
     best: tuple[int, Numbering] | None = None
@@ -276,7 +258,7 @@ def number_triangles(
         tried_px.append(white_px)
         numbered = _number_from(graph, lattice, int(node), GAP_AXIAL[ink])
         score = int((numbered.cell >= 0).sum()) - 3 * numbered.outside - numbered.conflicts
-        found = Numbering(numbered.marker, numbered.cell, white_px, numbered.conflicts, False)
+        found = Numbering(numbered.marker, numbered.cell)
         if best is None or score > best[0]:
             tie = best is not None and score - best[0] < 2
             best = (score, found)
@@ -284,9 +266,4 @@ def number_triangles(
             tie = True
     if best is None:
         return None
-    if tie:
-        nothing = np.full_like(best[1].marker_of_corner, -1)
-        return Numbering(
-            nothing, np.full_like(best[1].cell_of_triangle, -1), best[1].white_px, best[1].conflicts, True
-        )
-    return best[1]
+    return Numbering(*(np.full_like(numbers, -1) for numbers in best[1])) if tie else best[1]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.timing import timed
 from benchmarks.suites.camera.cases import CameraCase, sample_chain
 from benchmarks.suites.camera.shoot import CameraPicture, shoot
 from benchmarks.suites.scenes import WRONG_SHARE, shortest_edges, standard_layout
@@ -108,15 +108,11 @@ def read_case(case: CameraCase, preset: Preset) -> PictureResult:
     chain = sample_chain(case)
     picture = shoot(chain)
     extractor = cached_extractor(chain.pose.pattern, chain.pose.layers, preset)
-    times_ms = []
     try:
-        for _ in range(RUNS):
-            started = time.process_time()
-            markers = extractor.extract(picture.image)
-            times_ms.append(1e3 * (time.process_time() - started))
+        runs = [timed(partial(extractor.extract, picture.image)) for _ in range(RUNS)]
     except Exception as error:
         return raised_result(case, picture, repr(error))
-    return score_picture(case, picture, markers, min(times_ms))
+    return score_picture(case, picture, runs[0].result, min(one.cpu_ms for one in runs))
 
 
 def raised_result(case: CameraCase, picture: CameraPicture, reason: str) -> PictureResult:

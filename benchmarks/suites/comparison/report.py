@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks.frame.conditions import conditions_text
+from benchmarks.frame.plots import png_of, pyplot
 from benchmarks.frame.published import Page
 from benchmarks.frame.table import TEXT, Table
 from benchmarks.suites.comparison.measure import MethodResult, PooledResult
@@ -148,13 +148,10 @@ def key_figures(results: Sequence[MethodResult]) -> Table:
 
 def comparison_picture(results: Sequence[MethodResult]) -> bytes:
     """PNG: time against error, both logarithmic; one color per method, one mark per scene, the bounds as lines."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    plt = pyplot()
     from matplotlib.lines import Line2D
 
-    figure, axis = pyplot.subplots(figsize=(9.2, 4.8))
+    figure, axis = plt.subplots(figsize=(9.2, 4.8))
     drawn = [r for r in results if r.found_share >= MIN_FOUND]
     for r in drawn:
         axis.plot(
@@ -177,7 +174,4 @@ def comparison_picture(results: Sequence[MethodResult]) -> bytes:
     style = {"fontsize": 8, "frameon": False}
     figure.legend(handles=methods, loc="upper left", bbox_to_anchor=(0.65, 0.98), **style)
     figure.legend(handles=scenes, loc="lower left", bbox_to_anchor=(0.65, 0.1), **style)
-    data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=100, metadata={"Software": None})
-    pyplot.close(figure)
-    return data.getvalue()
+    return png_of(figure)

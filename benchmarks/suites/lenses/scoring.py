@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.frame.pooled import rms_of
+from benchmarks.frame.pooled import Columns, Figure, percentile, rms_of, total
 from benchmarks.frame.table import TEXT
 from benchmarks.suites.lenses.cameras import SIZE_PX
 from cmpdesign.calibration.camera import CameraCalibration
@@ -20,11 +20,6 @@ from extractor import View
 
 Array = NDArray[np.float64]
 MAX_RATIO = 1.1  # of a ray error over the best one, for a good choice of the model
-COLUMNS = {
-    "condition": TEXT, "cameras": "d", "seen px": ".4f", "stated px": ".4f", "z": ".2f", "parameters z": ".2f",
-    "image px": ".4f", "model within 1.1": TEXT, "bad found": TEXT, "good left out": "d", "chessboard px": ".4f",
-    "ratio": ".1f", "CPU s": ".1f",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -93,28 +88,32 @@ def model_ratio(found: CameraCalibration, true: View, pixels: Array) -> float:
     return errors[0] / min(errors)
 
 
-def pooled_row(name: str, rows: Sequence[CameraFigures]) -> tuple[object, ...]:
-    """One row of the table."""
-    pooled = {
-        one: rms_of([getattr(row, one) for row in rows])
-        for one in ("seen_px", "stated_px", "z", "image_px", "parameters_z", "board_px")
-        if np.isfinite([getattr(row, one) for row in rows]).any()
-    }
+def _pooled(name: str) -> tuple[str, Figure]:
+    """The RMS of an attribute over the cameras of which it is known."""
+    return ".2f" if name.endswith("z") else ".4f", lambda rows: rms_of([getattr(row, name) for row in rows])
+
+
+def _good_models(rows: Sequence[CameraFigures]) -> str:
     ratios = [row.model_ratio for row in rows if np.isfinite(row.model_ratio)]
-    board_px = pooled.get("board_px", float("nan"))
-    both = [row.seen_px for row in rows if np.isfinite(row.board_px)]
-    return (
-        name,
-        len(rows),
-        pooled["seen_px"],
-        pooled["stated_px"],
-        pooled["z"],
-        pooled.get("parameters_z", float("nan")),
-        pooled["image_px"],
-        f"{sum(one <= MAX_RATIO for one in ratios)} of {len(ratios)}",
-        f"{sum(row.bad_found for row in rows)} of {sum(row.bad for row in rows)}",
-        sum(row.good_refused for row in rows),
-        board_px,
-        board_px / rms_of(np.array(both)) if both else float("nan"),
-        float(np.median([row.cpu_s for row in rows])),
-    )
+    return f"{sum(one <= MAX_RATIO for one in ratios)} of {len(ratios)}"
+
+
+def _board_ratio(rows: Sequence[CameraFigures]) -> float:
+    both = [row for row in rows if np.isfinite(row.board_px)]
+    return rms_of([row.board_px for row in both]) / rms_of([row.seen_px for row in both])
+
+
+COLUMNS: Columns = {
+    "cameras": ("d", len),
+    "seen px": _pooled("seen_px"),
+    "stated px": _pooled("stated_px"),
+    "z": _pooled("z"),
+    "parameters z": _pooled("parameters_z"),
+    "image px": _pooled("image_px"),
+    "model within 1.1": (TEXT, _good_models),
+    "bad found": (TEXT, lambda rows: f"{total('bad_found')(rows)} of {total('bad')(rows)}"),
+    "good left out": ("d", total("good_refused")),
+    "chessboard px": _pooled("board_px"),
+    "ratio": (".1f", _board_ratio),
+    "CPU s": (".1f", percentile("cpu_s", 50)),
+}

@@ -6,13 +6,13 @@ place is nearer, else its position. In a picture without a pattern every reporte
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.timing import timed
 from benchmarks.suites.photoreal.pictures import NO_PATTERN, TracedPicture, TracedTruth
 from benchmarks.suites.scoring.calibration import squared_distances
 from benchmarks.suites.scoring.wrong import wrong_markers
@@ -75,11 +75,8 @@ def read_picture(picture: TracedPicture, preset: Preset = "balanced", runs: int 
     """Read a picture with the layout of its pad, the side told; a pad with relief also with the cells' height."""
     truth = picture.truth
     extractor = _extractor(picture, preset, False)
-    times_ms = []
-    for _ in range(runs):
-        started = time.process_time()
-        markers = extractor.extract(picture.image)
-        times_ms.append(1e3 * (time.process_time() - started))
+    readings = [timed(partial(extractor.extract, picture.image)) for _ in range(runs)]
+    markers = readings[0].result
     has_pattern = picture.family != NO_PATTERN
     squares = place_squares(markers, truth) if has_pattern else {}
     if has_pattern and truth.relief_mm:
@@ -97,7 +94,7 @@ def read_picture(picture: TracedPicture, preset: Preset = "balanced", runs: int 
         squares=squares,
         reason=str(markers.reason or ""),
         is_reason_right=is_reason_right(markers, truth, extractor.layout, has_pattern),
-        ms=min(times_ms),
+        ms=min(one.cpu_ms for one in readings),
     )
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.timing import timed
 from benchmarks.suites.scenes import shortest_edges, standard_layout
 from benchmarks.suites.scoring.score import (
     EMPTY_SCORE,
@@ -73,13 +73,6 @@ def render_plain_image(pattern: str) -> Image:
     return plain_frame(pattern, 0).shoot().image
 
 
-def time_extraction(extractor: Extractor, image: Image) -> tuple[Markers, float]:
-    """The markers, and the processor time in ms."""
-    started = time.process_time()
-    markers = extractor.extract(image)
-    return markers, 1e3 * (time.process_time() - started)
-
-
 def layout_layers(shot: CaseImage) -> int:
     """Layers of the layout to search: the scene's layers, or 11 in images without a pattern."""
     return int(shot.scene.layout.marker_layer.max()) if shot.scene else 11
@@ -103,10 +96,9 @@ def read_case(case: StressCase, runs: int, *, timing: bool = True) -> CaseReadin
         for _ in range(1 if pixels > LARGE_PX else runs):
             plain_ms = math.nan
             if comparable:
-                plain_ms = time_extraction(
-                    cached_extractor(case.pattern, 11), render_plain_image(case.pattern)
-                )[1]
-            markers, ms = time_extraction(extractor, shot.image)
+                plain, image = cached_extractor(case.pattern, 11), render_plain_image(case.pattern)
+                plain_ms = timed(partial(plain.extract, image)).cpu_ms
+            markers, ms, _ = timed(partial(extractor.extract, shot.image))
             times_ms.append(ms)
             ratios.append(ms / plain_ms)
     except Exception as error:

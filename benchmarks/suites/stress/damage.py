@@ -109,17 +109,22 @@ def with_blobs(frame: PatternFrame, count: int, radius_mm: float, rgb: RGB = DIR
     return frame.damaged(blobs=spots)
 
 
+def band(frame: PatternFrame, turn_rad: float, offset_mm: float, width_mm: float, rgb: RGB) -> Scratch:
+    """A straight band across the whole pattern, at a distance from the centre."""
+    along = np.array([np.cos(turn_rad), np.sin(turn_rad)])
+    middle, reach = offset_mm * np.array([-along[1], along[0]]), max(frame.layout.size_mm)
+    (ax, ay), (bx, by) = (middle - reach * along).tolist(), (middle + reach * along).tolist()
+    return Scratch((ax, ay), (bx, by), width_mm, rgb)
+
+
 def with_scratches(
     frame: PatternFrame, count: int, width_mm: float, rgb: RGB = (150.0, 150.0, 150.0), aside: float = 2.5
 ) -> PatternFrame:
     """Bands across the whole pattern, at least ``aside`` mm from the centre."""
-    reach, rng = max(frame.layout.size_mm), frame.rng
-    bands = []
+    rng, bands = frame.rng, []
     for turn in rng.uniform(0, 2 * np.pi) + np.pi * np.arange(count) / count * 2:
-        along, normal = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-        middle = normal * (aside + 0.5 * width_mm + rng.uniform(0, 4) * (aside > 0))
-        start, end = middle - reach * along, middle + reach * along
-        bands.append(Scratch((start[0], start[1]), (end[0], end[1]), width_mm, rgb))
+        offset_mm = aside + 0.5 * width_mm + rng.uniform(0, 4) * (aside > 0)
+        bands.append(band(frame, turn, offset_mm, width_mm, rgb))
     return frame.damaged(scratches=tuple(bands))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import cv2
 import numpy as np
@@ -96,67 +95,31 @@ def recolor_to_one_ink(layout: Layout, rng: np.random.Generator) -> Layout:
     return replace(layout, cell_color=color)
 
 
-def _empty_change(
-    draw: Callable[..., Pixels], **fixed: object
-) -> Callable[[PatternFrame, float], EmptyFrame]:
-    """A kind's change: the image is drawn from the frame's seed, in small and standard size in turn."""
+REPEATS = 12  # for each of the three patterns; 28 steps: more than 1,000 images
+
+
+def _nothing(
+    name: str, unit: str, steps: tuple[float, ...], draw: Callable[..., Pixels], **fixed: object
+) -> ConditionKind:
+    """A kind without a pattern: drawn from the frame's seed, in small and standard size in turn."""
 
     def change(frame: PatternFrame, step: float) -> EmptyFrame:
         seed = frame.scene.seed
-        size = (320, 240) if seed % 2 else (640, 480)
-        return EmptyFrame(partial(_draw_image, draw, step, fixed), size, seed)
+        return EmptyFrame(
+            lambda rng, size: draw(rng, size, step, **fixed), (320, 240) if seed % 2 else (640, 480), seed
+        )
 
-    return change
+    return ConditionKind(f"nothing: {name}", unit, steps, change, False, REPEATS)
 
-
-def _draw_image(
-    draw: Callable[..., Pixels], step: float, fixed: dict[str, object], rng: np.random.Generator, size: Size
-) -> Pixels:
-    return draw(rng, size, step, **fixed)
-
-
-REPEATS = 12  # for each of the three patterns; 28 steps: more than 1,000 images
 
 EMPTY_KINDS = group_kinds(
     "nothing",
-    ConditionKind("nothing: noise", "grain px", (0, 1, 3, 8), _empty_change(noise_image), False, REPEATS),
-    ConditionKind("nothing: one color", "noise", (0, 2, 10), _empty_change(uniform_image), False, REPEATS),
-    ConditionKind(
-        "nothing: clutter",
-        "shapes",
-        (10, 50, 150, 400),
-        _empty_change(clutter_image, triangles=False),
-        False,
-        REPEATS,
-    ),
-    ConditionKind(
-        "nothing: triangles",
-        "shapes",
-        (10, 50, 150, 400),
-        _empty_change(clutter_image, triangles=True),
-        False,
-        REPEATS,
-    ),
-    ConditionKind(
-        "nothing: smooth areas", "levels", (2, 3, 4, 6), _empty_change(photo_like_image), False, REPEATS
-    ),
-    ConditionKind(
-        "nothing: colored squares", "px", (8, 14, 24), _empty_change(checkerboard_image), False, REPEATS
-    ),
-    ConditionKind(
-        "nothing: shuffled colors",
-        "px",
-        (10, 16, 24),
-        _empty_change(recolored_pattern_image, recolor=shuffle_colors),
-        False,
-        REPEATS,
-    ),
-    ConditionKind(
-        "nothing: one ink",
-        "px",
-        (10, 16, 24),
-        _empty_change(recolored_pattern_image, recolor=recolor_to_one_ink),
-        False,
-        REPEATS,
-    ),
+    _nothing("noise", "grain px", (0, 1, 3, 8), noise_image),
+    _nothing("one color", "noise", (0, 2, 10), uniform_image),
+    _nothing("clutter", "shapes", (10, 50, 150, 400), clutter_image, triangles=False),
+    _nothing("triangles", "shapes", (10, 50, 150, 400), clutter_image, triangles=True),
+    _nothing("smooth areas", "levels", (2, 3, 4, 6), photo_like_image),
+    _nothing("colored squares", "px", (8, 14, 24), checkerboard_image),
+    _nothing("shuffled colors", "px", (10, 16, 24), recolored_pattern_image, recolor=shuffle_colors),
+    _nothing("one ink", "px", (10, 16, 24), recolored_pattern_image, recolor=recolor_to_one_ink),
 )

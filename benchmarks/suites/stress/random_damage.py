@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.suites.stress.damage import missing_cell_clusters, sample_places
+from benchmarks.suites.stress.damage import band, missing_cell_clusters, sample_places
 from benchmarks.suites.stress.frames import RGB, PatternFrame
 from benchmarks.suites.stress.kinds import ConditionKind, FrameChange, group_kinds
 from cmpdesign.scene import Blob, Glare, Light, Press, Scratch, Shear, Twist, colored_leds
@@ -26,16 +26,13 @@ def sample_color(rng: Rng) -> RGB:
 
 def sample_long_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
     """Bands of random widths across the whole pattern, some over the white cell."""
-    reach, bands = max(frame.layout.size_mm), []
-    for turn in rng.uniform(0, 2 * np.pi, rng.integers(1, 7)):
-        along, normal = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-        middle = normal * rng.uniform(0.5, 7)
-        bands.append(
-            _make_scratch(
-                middle - reach * along, middle + reach * along, rng.uniform(0.1, 1.4), sample_color(rng)
-            )
+    turns = rng.uniform(0, 2 * np.pi, rng.integers(1, 7))
+    return {
+        "scratches": tuple(
+            band(frame, turn, rng.uniform(0.5, 7), float(rng.uniform(0.1, 1.4)), sample_color(rng))
+            for turn in turns
         )
-    return {"scratches": tuple(bands)}
+    }
 
 
 def sample_short_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
@@ -45,14 +42,10 @@ def sample_short_scratches(frame: PatternFrame, rng: Rng) -> DamageFields:
     for start in sample_places(frame, int(rng.integers(5, 40)), 0.5):
         turn, length = rng.uniform(0, 2 * np.pi), rng.uniform(1, 8)
         end = start + length * np.array([np.cos(turn), np.sin(turn)])
-        bands.append(
-            _make_scratch(start, end, rng.uniform(0.1, 0.6), sample_color(rng) if own_colors else common)
-        )
+        width_mm, (ax, ay), (bx, by) = float(rng.uniform(0.1, 0.6)), start.tolist(), end.tolist()
+        rgb = sample_color(rng) if own_colors else common
+        bands.append(Scratch((ax, ay), (bx, by), width_mm, rgb))
     return {"scratches": tuple(bands)}
-
-
-def _make_scratch(start: Any, end: Any, width_mm: float, rgb: RGB) -> Scratch:
-    return Scratch((float(start[0]), float(start[1])), (float(end[0]), float(end[1])), float(width_mm), rgb)
 
 
 def sample_blobs(frame: PatternFrame, rng: Rng) -> DamageFields:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -23,11 +24,14 @@ import cmpdesign
 from benchmarks.latency.timed_camera import Fault, TimedCamera, in_the_place_of_opencv, write_sensor
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.runtime.events import EventKind
+from cmpdesign.runtime.opening import Sensors
 from cmpdesign.runtime.pairing import nearest_places
+from cmpdesign.runtime.plan import plan_of
 from cmpdesign.runtime.publish.serving import SensorServer
 from cmpdesign.runtime.sensor import LateError
 from cmpdesign.runtime.zero import TouchedError
 from cmpdesign.scene import Press
+from cmpdesign.sensor.sensor_file import load_sensor_file
 from cmpdesign.sensor.tables import SensorError
 from extractor import FrameStatus
 from tests.support.layouts import small_text
@@ -99,6 +103,9 @@ def test_the_newest_frame_with_its_time(folder: Path, plug: Plug, shots: list[An
         assert health.latency_ms[0] <= health.latency_ms[2] and health.qualities[0].blur_px > 0.5
     with pytest.raises(LateError, match="thumb: no result after"):
         sensors.thumb.wait(after=frame.index + 1000, timeout_s=0.01)
+    for timeout_s in (float("nan"), float("inf"), None):
+        with pytest.raises(CmpDesignError, match=f"timeout_s is {timeout_s}; give the longest wait"):
+            sensors.thumb.wait(after=10**6, timeout_s=timeout_s)
 
 
 def test_dropped_frames_are_counted(folder: Path, plug: Plug, shots: list[Any]) -> None:
@@ -179,8 +186,36 @@ def test_two_sensors_are_paired_by_time(folder: Path, plug: Plug, shots: list[An
             assert frames.offsets_ms == {"thumb": 0.0, "index": pytest.approx(offset_ms)}
             grid = (offset_ms - 10) / 50  # of the exposures; on a busy machine frames are dropped
             assert abs(grid - round(grid)) < 1e-3
+    copy = pickle.loads(pickle.dumps(frames))
+    assert copy.index.taken_s == frames.index.taken_s and copy.offsets_ms == frames.offsets_ms
     assert nearest_places([[0.0, 0.05, 0.1], [0.01, 0.06]]) == [1, 1]
     assert nearest_places([[0.0], []]) is None
+
+
+def test_results_that_are_waited_for_are_newer_of_every_sensor() -> None:
+    """A sensor that is behind, at 52 ms, must not take the other one back to its former result."""
+    thumb, index = Played("thumb", [0, 52, 104], 2), Played("index", [4, 104], 1)
+    sensors: Any = Sensors([thumb, index])
+    before = sensors.wait()
+    assert [one.taken_s for one in before] == [0, 4]
+    index.shown = 2
+    assert [one.taken_s for one in sensors.wait(before)] == [104, 104]
+
+
+class Played:
+    """A sensor with the results of a list of times; a wait shows the next one."""
+
+    def __init__(self, name: str, times: list[int], shown: int) -> None:
+        self.name, self.shown = name, shown
+        self._all = [SimpleNamespace(name=name, index=k, taken_s=time_s) for k, time_s in enumerate(times)]
+
+    @property
+    def results(self) -> list[Any]:
+        return self._all[: self.shown]
+
+    def wait(self, after: int, timeout_s: float) -> None:
+        if self.results[-1].index <= after:
+            self.shown += 1
 
 
 def test_zero_takes_the_mean_at_rest_and_refuses_a_touched_pattern(folder: Path, plug: Plug) -> None:
@@ -206,8 +241,7 @@ def test_zero_takes_the_mean_at_rest_and_refuses_a_touched_pattern(folder: Path,
             sensors.zero()
         assert sensors.thumb.health.rest_error_px > 0.3
         sensors.zero(check=False)
-        after_zero = sensors.thumb.wait(after=sensors.thumb.results[-1].index + 1)
-        assert np.nanmax(np.abs(after_zero.tracked.displacement_px)) < 0.2
+        assert np.nanmax(np.abs(sensors.thumb.results[-1].tracked.displacement_px)) < 0.2  # at once
         shown = [one.image for one in moving(6, speed=8)]
         time.sleep(0.1)
         with pytest.raises(TouchedError, match="the markers move by"):
@@ -310,6 +344,17 @@ def test_a_surface_of_recorded_views(tmp_path: Path) -> None:
     assert last.index == 3 and sum(1 + one.dropped for one in sensors.hand.results) == 4
     truth = np.load(tmp_path / "truth.npy")[3, : len(last.shape.xyz_mm)]
     assert np.sqrt(np.nanmean((last.shape.xyz_mm - truth) ** 2)) < 0.02 and len(last.markers) == 2
+    image = cv2.imread(str(min((tmp_path / "frames").glob("*.png"))))
+    alone = plan_of(load_sensor_file(tmp_path / "hand.toml"), ["markers"]).first_tracker(image)
+    assert alone is not None and [one.markers.found for one in alone.track(image).views] == [True, True]
+
+
+def test_one_view_by_a_mirror(folder: Path, shots: list[Any]) -> None:
+    path = folder / "thumb.toml"
+    path.write_text(path.read_text().replace('name = "camera"', 'name = "camera"\nmirrored = true'))
+    image = np.ascontiguousarray(shots[0].image[:, ::-1])
+    tracker = plan_of(load_sensor_file(path), None).first_tracker(image)
+    assert tracker is not None and tracker.track(image).status == FrameStatus.TRACKED
 
 
 def test_results_are_served(folder: Path, plug: Plug, shots: list[Any]) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +101,25 @@ def test_force_torque_and_utilisation_of_a_sheared_and_twisted_ball(
     utilisation = np.hypot(*press.force_n[:2]) / (0.5 * -press.force_n[2])
     assert found.utilisation == pytest.approx(utilisation, abs=0.05)
     np.testing.assert_allclose(sum(region.force_n for region in found.regions), found.force_n, atol=1e-9)
+
+
+def processor_ms_of_other_threads() -> float:
+    """Of all threads of this process but the caller's, so far."""
+    others = [one for one in Path("/proc/self/task").iterdir() if int(one.name) != threading.get_native_id()]
+    ticks = [(one / "stat").read_text().rpartition(")")[2].split()[11:13] for one in others]
+    return 1e3 * sum(int(each) for both in ticks for each in both) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="times of threads are those of Linux")
+def test_frames_wake_no_threads_of_linear_algebra(layout: Reference, gel: Gel) -> None:
+    """They would wait for their next product by computing, for 30 ms or more, on a core that others need."""
+    press, reader = Press(gel, (0.0, 0.0, 4.0)), ContactReader(layout, gel, YOUNG_MPA, model=LINEAR)
+    time.sleep(0.15)  # such threads wait since the reader was made
+    before_ms = processor_ms_of_other_threads()
+    for seed in range(3):
+        assert reader.read(press.seen(seed), cov(layout)).reason is ContactReason.NONE
+        time.sleep(0.03)
+    assert processor_ms_of_other_threads() - before_ms < 20
 
 
 def test_a_large_strain_needs_more_force(layout: Reference, gel: Gel) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 
+from benchmarks.frame.plots import png_of, pyplot
 from cmpdesign.contact import Ball, Contact, Elastomer, Motion, solve
 
 DOTS_PER_INCH = 110
@@ -18,10 +18,7 @@ SIZE_MM, GRID, SHOWN_MM = (24.0, 24.0), 120, 8.0
 
 def figures() -> dict[str, bytes]:
     """File name -> PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    plt = pyplot()
 
     pressed, sheared = (
         solve(ELASTOMER, BALL, motion, friction=0.5, size_mm=SIZE_MM, grid=GRID) for motion in MOTIONS
@@ -34,10 +31,8 @@ def figures() -> dict[str, bytes]:
         _pressure(axes[0], pressed)
         _section(axes[1], pressed)
         _slip(axes[2], sheared)
-        file = BytesIO()
-        figure.savefig(file, format="png", metadata={"Software": None}, facecolor="white")
-        plt.close(figure)
-    return {"contact.png": file.getvalue()}
+        file = png_of(figure)
+    return {"contact.png": file}
 
 
 def _pressure(axes: Any, contact: Contact) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 
+from benchmarks.frame.plots import png_of, pyplot
 from cmpdesign.layout.layout import Layout
 from cmpdesign.patterns.colors import BLACK, COLORS
 
@@ -21,10 +21,7 @@ ARROWS_WINDOW_PX = (115, 65, 475, 335)
 
 def figures() -> dict[str, bytes]:
     """File name -> PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    plt = pyplot()
 
     shown = sample()
     with plt.rc_context({"font.family": "DejaVu Sans", "text.color": INK}):
@@ -33,10 +30,8 @@ def figures() -> dict[str, bytes]:
         _pattern(axes[0], shown.layout)
         _ids(axes[1], shown)
         _arrows(axes[2], shown)
-        file = BytesIO()
-        figure.savefig(file, format="png", metadata={"Software": None}, facecolor="white")
-        plt.close(figure)
-    return {"overview.png": _quantised(file.getvalue())}
+        file = png_of(figure)
+    return {"overview.png": _quantised(file)}
 
 
 def _pattern(axes: Any, layout: Layout) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.frame.plots import png_of, pyplot
 from cmpdesign.contact import Ball, Elastomer, Motion, solve
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
@@ -25,10 +25,7 @@ STEP_MM = 0.2
 
 def figures() -> dict[str, bytes]:
     """File name -> PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    plt = pyplot()
 
     layout = build_layout(load_design("tac3d"))
     found = load_scene(RIG, layout)
@@ -43,15 +40,13 @@ def figures() -> dict[str, bytes]:
     reconstructor = Reconstructor(views.layout, views.rig, views.extract(rest))
     shape = reconstructor.reconstruct(views.extract(image))
 
-    figure, axes = pyplot.subplots(2, 1, figsize=(8, 8.2), height_ratios=(1, 1.8))
+    figure, axes = plt.subplots(2, 1, figsize=(8, 8.2), height_ratios=(1, 1.8))
     axes[0].imshow(cv2.cvtColor(image[150:570], cv2.COLOR_BGR2RGB))
     axes[0].set_axis_off()
     _map(figure, axes[1], layout, reconstructor, shape)
     figure.tight_layout()
-    file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
-    pyplot.close(figure)
-    return {"reconstruction.png": _packed(file.getvalue())}
+    file = png_of(figure)
+    return {"reconstruction.png": _packed(file)}
 
 
 def _map(figure: Any, axis: Any, layout: Layout, reconstructor: Reconstructor, shape: Shape) -> None:

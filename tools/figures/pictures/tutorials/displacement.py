@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
 
+from benchmarks.frame.plots import png_of, pyplot
 from cmpdesign.design.design import load_design
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.build import build_layout
@@ -42,10 +42,7 @@ def figures(page: str) -> dict[str, bytes]:
 
 def _arrows(reference: Reference, shape: Shape) -> Picture:
     """Arrows along the pattern, five times as long as they are, on colors of the depth."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    plt = pyplot()
 
     x, y = reference.xy_mm.T
     dx, dy, dz = shape.displacement_mm.T
@@ -58,7 +55,5 @@ def _arrows(reference: Reference, shape: Shape) -> Picture:
         axes.set(aspect="equal", xlabel="x, mm", ylabel="y, mm")
         figure.colorbar(colors, ax=axes, label="displacement in z, mm")
         figure.tight_layout(pad=0.4)
-        file = BytesIO()
-        figure.savefig(file, format="png", metadata={"Software": None}, facecolor="white")
-        plt.close(figure)
-    return np.asarray(cv2.imdecode(np.frombuffer(file.getvalue(), np.uint8), cv2.IMREAD_COLOR), np.uint8)
+        file = png_of(figure)
+    return np.asarray(cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_COLOR), np.uint8)
