@@ -80,7 +80,6 @@ def check(
         design, overrides, camera, preset: see ``build``.
         read: draw and read the pads that laser, mold and print would make.
     """
-
     chosen = _design(design, overrides)
     checked = chosen.check(camera, read=read, preset=preset)
     return documents.designs.CheckDocument.of(

@@ -64,12 +64,18 @@ def experiment(
     return decorated
 
 
+def _changed(what: str, rows: Report) -> Table:
+    """The figures of both patterns, and the change beside the article's."""
+    names = ("square", "multicolor", "change_percent", "article_change_percent")
+    return {f"{what}, {case}": {name: one[name] for name in names} for case, one in rows.items()}
+
+
 @experiment(
     "cmpdesign evaluate precision -o precision --trials 10", QUICK, trials="places for every object and cube"
 )
 def precision(report: Report) -> Table:
     """Measure the error on five pressed objects, and the edge fitting error of a cube."""
-    return {f"edge fitting error in mm, {mode}": one for mode, one in report["edge_fit_error_mm"].items()}
+    return _changed("edge fitting error in mm", report["edge_fit_error_mm"])
 
 
 @experiment(
@@ -79,7 +85,7 @@ def precision(report: Report) -> Table:
 )
 def response(report: Report) -> Table:
     """Measure the share of a shear that the markers under a cube show."""
-    return {f"response, {case}": one for case, one in report["response"].items()}
+    return _changed("response", report["response"])
 
 
 @experiment(

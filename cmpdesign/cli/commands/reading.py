@@ -53,13 +53,8 @@ def _verified(
     *, layout: LayoutsArgument, images: SourcesArgument, **options: Any
 ) -> documents.reading.VerifyDocument:
     """The verdicts; the names of further layouts stand before the pictures."""
-    layouts = [layout, *(Path(text) for text in takewhile(_is_layout, images))]
+    layouts = [layout, *map(Path, takewhile(lambda text: text.lower().endswith(".json"), images))]
     return verifying.verify(layouts, images[len(layouts) - 1 :], **options)
-
-
-def _is_layout(text: str) -> bool:
-    """Whether a text beside the pictures names a layout file; no picture or video ends so."""
-    return text.lower().endswith(".json")
 
 
 @command(
