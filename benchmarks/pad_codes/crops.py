@@ -45,7 +45,7 @@ def read_crops(crops: int, seed: int, processes: int) -> Iterator[CropPair]:
     while crops > 0:
         some = [(number, seed) for number in islice(numbers, 2 * crops)]
         for pair in results_of(both_read, some, processes):
-            if pair.coded.black_cells >= MIN_BLACK_CELLS and crops > 0:
+            if pair.coded.seen.black_cells >= MIN_BLACK_CELLS and crops > 0:
                 crops -= 1
                 yield pair
 
@@ -54,7 +54,7 @@ def crops_table(crops: int, seed: int, processes: int) -> Table:
     """A row for each group of crops by the black cells in view."""
     read = list(read_crops(crops, seed, processes))
     groups = {
-        group: [pair for pair in read if low <= pair.coded.black_cells < high]
+        group: [pair for pair in read if low <= pair.coded.seen.black_cells < high]
         for group, (low, high) in GROUPS.items()
     }
     return pooled_table("crops of pads of 5 to 11 layers", "in view", COLUMNS, groups)

@@ -40,12 +40,12 @@ def measure(views: int = 300, seed: int = COMMIT, processes: int = PROCESSES) ->
         f"{kind}, {name}": [] for kind in KINDS for name in ("one motion", "one by cut cells", "several")
     }
     for result in results:
-        cut = "one by cut cells" if result.motions_of_parts == 1 else "several"
-        groups[f"{result.view.kind}, {'one motion' if result.motions == 1 else cut}"].append(result)
+        cut = "one by cut cells" if result.seen.motions_of_parts == 1 else "several"
+        groups[f"{result.view.kind}, {'one motion' if result.seen.motions == 1 else cut}"].append(result)
     yield pooled_table("views", "views", columns(views), groups)
     for result in results:
         if result.wrong_ids:
-            of = f"{result.wrong_ids} wrong ids, {result.motions} motions"
+            of = f"{result.wrong_ids} wrong ids, {result.seen.motions} motions"
             yield f"{result.view.kind}/{result.view.number}: {of}"
     return Found(failed=any(result.wrong_ids for result in results))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.calibration.camera import CameraCalibration
+    from cmpdesign.inputs.cameras import CameraState
     from cmpdesign.sensor.sensor_file import SensorFile
     from extractor import LearntLayout, Markers, Reference, Rig
 
@@ -267,27 +268,33 @@ def calibrate_rig(
 
 def calibrate_check(
     sensor: str | Path,
-    images: Annotated[str | Path | Sequence[str | Path], Written(metavar="REST")],
+    images: Annotated[str | Path | Sequence[str | Path], Written(metavar="REST")] = (),
     *,
     layout: AnyLayout | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> documents.calibration.CalibrateCheckDocument:
-    """Check a sensor's calibration by its pad at rest. If it does not hold, the cause and the step to repeat are named.
+    """Check a sensor by its pad at rest: cameras, light, focus, markers read, residuals, force scale, ages.
+
+    If the calibration does not hold, the cause and the step to repeat are named.
 
     >>> found = cmpdesign.calibrate_check("sensor.toml", ["today.png"])
     >>> found.holds, found.misfit, [one.cause for one in found.causes if one.likely], found.steps
 
     Args:
         sensor: sensor file that calibrate rig wrote; it names its layout.
-        images: pictures of the pad at rest; of several cameras one each, joined by commas.
+        images: pictures of the pad at rest; of several cameras one each, joined by commas; None: frames of the sensor's
+            own [camera].
         layout: the pad's layout; None: the one that the file names.
         max_pixels: see ``SequenceOptions``.
 
     Raises:
-        CmpDesignError, extractor.ExtractorError: files that cannot be read, or pictures that show no pattern.
+        CmpDesignError, extractor.ExtractorError: files or cameras that cannot be read, or pictures that show no
+            pattern.
     """
     from cmpdesign.api.layouts import reference_from
     from cmpdesign.calibration.rig.check import check_markers
+    from cmpdesign.calibration.rig.state import ages_days, camera_states, force_scale, view_states
+    from cmpdesign.runtime.opening import look_at_rest
     from cmpdesign.sensor.sensor_file import load_sensor_file
 
     file = load_sensor_file(sensor)
@@ -299,8 +306,13 @@ def calibrate_check(
         )
     reference = reference_from(file.layout if layout is None else layout)
     file.require_layout(reference)
-    names = [str(images)] if isinstance(images, str | Path) else [str(one) for one in images]
-    found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
+    names = [str(images)] if isinstance(images, str | Path) else [str(one) for one in images or ()]
+    cameras: Mapping[str, CameraState | None] = {}
+    if names:
+        found = _read_views(file, reference, file.rig, names, "designed", max_pixels)
+    else:
+        live = look_at_rest(sensor)
+        found, cameras, names = [live.markers], live.cameras, [file.table.camera.source]
     before = file.table.calibration.rig
     stated = before.rms_px if before is not None and len(before.rms_px) == len(file.rig.views) else ()
     return check_markers(
@@ -310,6 +322,10 @@ def calibrate_check(
         stated_px=dict(zip(file.rig.names, stated, strict=False)),
         scale=before.scale if before is not None else 1.0,
         limit_px=file.table.limits.max_rest_error_px,
+        views=view_states(file, reference, found[-1]),
+        cameras=camera_states(cameras),
+        force=force_scale(file, reference),
+        ages_days=ages_days(file, date.today()),
     )
 
 

@@ -24,8 +24,7 @@ def build(
     output: Annotated[str | Path, Written(metavar="FOLDER")] = "out",
     *,
     overrides: Annotated[
-        Mapping[str, object] | None,
-        Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm"),
+        Mapping[str, object] | None, Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm")
     ] = None,
     products: Annotated[
         str | Iterable[str], Written(name="--only", metavar="NAMES", with_commas=True)
@@ -67,8 +66,7 @@ def check(
     design: str | Path | Parameters,
     *,
     overrides: Annotated[
-        Mapping[str, object] | None,
-        Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm"),
+        Mapping[str, object] | None, Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm")
     ] = None,
     camera: Annotated[tuple[int, int], Written(metavar="WxH")] = CAMERA_PX,
     read: bool = False,

@@ -98,10 +98,7 @@ def plain_scene(layout: AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -
 
 
 def load_scene(
-    name_or_path: str | Path,
-    layout: AnyLayout,
-    size: tuple[int, int] | None = None,
-    seed: int | None = None,
+    name_or_path: str | Path, layout: AnyLayout, size: tuple[int, int] | None = None, seed: int | None = None
 ) -> SceneFile:
     """Load a scene: a scene template's name or a TOML file.
 

@@ -110,16 +110,11 @@ def recover_run(
     if of == "reconstruct":
         rows += len(pattern.edges) * pattern.virtual_per_edge
     found = recover_table(Path(output), rows)
-    return documents.runs.RecoverDocument(
-        written=str(output) if found.frames else None, frames=found.frames, problems=tuple(found.problems)
-    )
+    return documents.runs.RecoverDocument.of(found, written=str(output) if found.frames else None)
 
 
 def track_job(
-    layout: AnyLayout,
-    source: AnySource,
-    output: str | Path,
-    **options: Unpack[TrackOptions],
+    layout: AnyLayout, source: AnySource, output: str | Path, **options: Unpack[TrackOptions]
 ) -> TrackJob:
     """The work of ``track``, with all options."""
     from cmpdesign.api.layouts import reference_from
@@ -143,7 +138,9 @@ def reconstruct_job(
 
     chosen = settled(ShapeOptions, options)
     pattern = reference_from(layout)
-    return ReconstructJob(pattern, Path(rig), _list_text(rest), _list_text(source), Path(output), chosen)
+    return ReconstructJob(
+        pattern, Path(rig), ",".join(_texts(rest)), ",".join(_texts(source)), Path(output), chosen
+    )
 
 
 def open_source(
@@ -198,11 +195,6 @@ def cameras() -> documents.runs.CamerasDocument:
     )
 
 
-def _texts(source: AnySource) -> tuple[str, ...]:
+def _texts(source: str | Path | int | Sequence[str | Path | int]) -> tuple[str, ...]:
     """The texts of one source or of several, as the sources' functions take them."""
     return (str(source),) if isinstance(source, str | Path | int) else tuple(map(str, source))
-
-
-def _list_text(value: str | Path | int | Sequence[str | Path | int]) -> str:
-    """One name, or names with commas, as the sources' functions take them."""
-    return str(value) if isinstance(value, str | Path | int) else ",".join(map(str, value))

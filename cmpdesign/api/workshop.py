@@ -94,10 +94,7 @@ def calibrate_gel(
         gel.write(stream)
         write_file(Path(output), stream.getvalue())
     return documents.reading.CalibrateGelDocument.of(
-        gel,
-        written=str(output or ""),
-        markers=len(gel.matrix) // 3,
-        loads=len(gel.loads_mm),
+        gel, written=str(output or ""), markers=len(gel.matrix) // 3, loads=len(gel.loads_mm)
     )
 
 

@@ -107,7 +107,7 @@ def derived(
             values = {
                 name: parsers[name](each) if name in parsers else each
                 for name, each in values.items()
-                if name not in keys or _is_given(ctx, name)
+                if name not in keys or getattr(ctx.get_parameter_source(name), "name", "") == "COMMANDLINE"
             }
             with working(doing):
                 done = (calling or call)(**values)
@@ -126,11 +126,6 @@ def derived(
         return command
 
     return decorated
-
-
-def _is_given(ctx: typer.Context, name: str) -> bool:
-    source = ctx.get_parameter_source(name)
-    return source is not None and source.name == "COMMANDLINE"
 
 
 class _Names(dict[str, Any]):
@@ -170,7 +165,7 @@ def _taken(call: Callable[..., Any]) -> Iterator[_Taken]:
                 (one.usual for one in options_of(SequenceOptions) if one.name == each.name), Written()
             )
         default = each.default if written.needed is None else _REQUIRED if written.needed else None
-        is_placed = each.kind is each.POSITIONAL_OR_KEYWORD and each.default is _REQUIRED
+        is_placed = each.kind is each.POSITIONAL_OR_KEYWORD and each.default in (_REQUIRED, ())
         is_argument = is_placed and each.name != "output" and written.name is None
         yield _Taken(each.name, kind, default, written, is_argument)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -87,6 +87,32 @@ class CausePart(DocumentPart):
     likely: bool
 
 
+class ViewStatePart(DocumentPart):
+    """What the pictures of a view tell; null where unknown."""
+
+    share_read: float = Field(description="Markers measured, of those of the pad.")
+    blur_px: float | None = Field(description="Sigma of the blur, pixel included.")
+    evenness: float | None = Field(description="Light of the dimmest twentieth over that of the brightest.")
+    clipping: float | None = Field(description="Share of the colored cells that are overexposed.")
+    contrast: float | None = Field(description="CIE76 color difference of the two inks that differ least.")
+    hints: tuple[str, ...] = Field(description="What to change at light, focus or camera.")
+
+
+class CameraStatePart(DocumentPart):
+    """What a driver answers; null where it does not say."""
+
+    settings: dict[str, Any] = Field(description="Of camera_size, camera_fps and so on.")
+    notes: tuple[str, ...] = Field(description="Differences from what was asked, and what is automatic.")
+
+
+class ForceScalePart(DocumentPart):
+    """The scale of forces."""
+
+    young_mpa: float | None
+    young_sigma_mpa: float
+    gel: str | None = Field(description="The file of calibrate gel, which is this pad's.")
+
+
 class CalibrateCheckDocument(Document):
     """The result of ``calibrate check``."""
 
@@ -103,3 +129,7 @@ class CalibrateCheckDocument(Document):
     depth_error: float | None = Field(
         description="Relative error of depths by the likeliest cause; null where unknown."
     )
+    views: dict[str, ViewStatePart] = Field(description="In the last picture, or the mean of live frames.")
+    cameras: dict[str, CameraStatePart] = Field(description="Of live frames; empty for pictures.")
+    force: ForceScalePart | None = Field(description="null without [elastomer].")
+    ages_days: dict[str, int | None] = Field(description="Of each calibration; null without a date.")

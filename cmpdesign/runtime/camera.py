@@ -60,6 +60,9 @@ class Camera:
 
     Raises:
         SourceError: the source cannot be opened.
+
+    Attributes:
+        state: what the driver answers; None of a recorded source.
     """
 
     def __init__(
@@ -81,6 +84,7 @@ class Camera:
         self._pause_s = FIRST_PAUSE_S
         self._closing = Event()
         self._source: FrameSource | None = open_source()
+        self.state = next(iter(self._source.camera), None)
         self._thread = Thread(target=self._work, name=f"camera {name}", daemon=True)
         self._thread.start()
 
@@ -148,7 +152,7 @@ class Camera:
 
     def _read_to_end(self, source: FrameSource) -> str:
         """Keep the frames of a source; why it ended, "" at the end of a recorded source."""
-        frames = source.frames()
+        frames, self.state = source.frames(), next(iter(source.camera), None)
         self._last_time_s, began_s = float("nan"), time.monotonic()
         try:
             for frame in frames:
@@ -183,7 +187,7 @@ class Camera:
             self._steps_s.append(step_s)
         self._last_time_s = frame.time_s
         origin_s = source.times.origin[1] if source.is_live and source.times.origin else began_s
-        exposure_ms = source.camera[0].settings.exposure_ms if source.camera else None
+        exposure_ms = None if self.state is None else self.state.settings.exposure_ms
         taken_s = origin_s + frame.time_s - 0.5e-3 * (exposure_ms or 0.0)
         if self._is_silent and frame.image is not None:
             gap_s = now_s - self._arrived_s

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from cmpdesign.runtime.pairing import nearest_places
 from cmpdesign.runtime.plan import plan_of
 from cmpdesign.runtime.result import SensorFrame, SensorFrames
 from cmpdesign.runtime.sensor import LateError, Sensor
+from cmpdesign.runtime.zero import FRAMES, rest_markers
 from cmpdesign.sensor.sensor_file import load_sensor_file
 from cmpdesign.sensor.tables import SensorError
 
 if TYPE_CHECKING:
+    from cmpdesign.inputs.cameras import CameraState
     from cmpdesign.runtime.publish.recording import SensorRecording
+    from extractor import Markers
 
 
 class Sensors:
@@ -156,3 +160,30 @@ def open_sensor(*paths: str | Path, outputs: Iterable[str] | None = None) -> Sen
         Sensors(opened).close()
         raise
     return Sensors(opened)
+
+
+class RestLook(NamedTuple):
+    """What a sensor's own cameras show at rest.
+
+    Attributes:
+        markers: of each view, the mean of some frames; with the deviations of one frame, since errors that all frames
+            have in common do not average out.
+        cameras: camera -> what its driver answers; None of a recorded source.
+    """
+
+    markers: tuple[Markers, ...]
+    cameras: dict[str, CameraState | None]
+
+
+def look_at_rest(path: str | Path) -> RestLook:
+    """Open a sensor, read some frames of its pad at rest, and close it.
+
+    Raises:
+        TouchedError: the pattern moves, or is not seen.
+        SensorError, SourceError, LateError: see ``open_sensor``; no frames come.
+    """
+    with open_sensor(path, outputs=["markers"]) as sensors:
+        (sensor,) = sensors
+        frames = sensor.next_results(FRAMES)
+        rest = rest_markers(frames, None, sensor.plan.layout, None)
+        return RestLook(tuple(replace(one, cov_px2=FRAMES * one.cov_px2) for one in rest), sensor.cameras)

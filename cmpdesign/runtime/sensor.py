@@ -29,6 +29,7 @@ from cmpdesign.runtime.zero import FRAMES as ZERO_FRAMES
 from cmpdesign.runtime.zero import rest_markers
 
 if TYPE_CHECKING:
+    from cmpdesign.inputs.cameras import CameraState
     from extractor import ContactTracker, ShapeTracker, Tracker
 
 KEPT_RESULTS = 16  # of which those of several sensors are paired; chosen, as each holds its image
@@ -93,6 +94,11 @@ class Sensor:
         return tuple(self._results)
 
     @property
+    def cameras(self) -> dict[str, CameraState | None]:
+        """Camera -> what its driver answers; None of a recorded source."""
+        return {one.name: one.state for one in self._cameras}
+
+    @property
     def health(self) -> Health:
         """The state of the sensor by its last frames.
 
@@ -147,6 +153,18 @@ class Sensor:
                 return self._results[-1]
         raise LateError(self._late_text(f"no result after {after} within {timeout_s:g} s"))
 
+    def next_results(self, count: int) -> list[SensorFrame]:
+        """Results of frames that are read from now on, without those that were dropped.
+
+        Raises:
+            LateError: no frames come.
+        """
+        last, found = self.wait().index, list[SensorFrame]()
+        while len(found) < count:
+            found.append(self.wait(last, ZERO_WAIT_S))
+            last = found[-1].index
+        return found
+
     def zero(self, check: bool = True) -> None:
         """Take the mean of the next frames as the rest frame, from which displacement, shape and force count.
 
@@ -161,10 +179,7 @@ class Sensor:
             TouchedError: the pattern moves, is touched or not seen; the rest frame is the former one.
             LateError: no frames come.
         """
-        last, frames = self.wait().index, list[SensorFrame]()
-        while len(frames) < ZERO_FRAMES:
-            frames.append(self.wait(last, ZERO_WAIT_S))
-            last = frames[-1].index
+        frames = self.next_results(ZERO_FRAMES)
         before = self._rest.markers if check and self._rest is not None else None
         layout, limits = self.plan.layout, self.plan.file.table.limits
         rest = rest_markers(frames, before, layout, limits.max_rest_error_px)

@@ -119,7 +119,7 @@ def test_seen_cells_are_clear_of_covers_and_in_the_picture() -> None:
 def test_a_view_without_the_white_cell_has_no_wrong_id(kind: str) -> None:
     results = [read_view(DrawnView(kind, 1, number)) for number in range(3)]
     assert not any(result.wrong_ids for result in results)
-    assert all(result.motions >= 1 and result.cells for result in results)
+    assert all(result.seen.motions >= 1 and result.seen.cells for result in results)
     assert results == [read_view(DrawnView(kind, 1, number)) for number in range(3)]
 
 

@@ -15,7 +15,7 @@ def view_cases(seed: int) -> Iterator[CalibrationCase]:
     """Damaged crops without the white cell; of each the seen cells fit one motion only."""
     for number in count():
         shot = shoot_view(DrawnView(DAMAGED, seed, number))
-        if shot.motions == 1:
+        if shot.seen.motions == 1:
             picture = shot.picture
             truth = KnownPositions(picture.marker_xy_px, visible=picture.visible)
             yield CalibrationCase(DAMAGED, picture.layout, partial(KnownPicture, picture.image, (truth,)))

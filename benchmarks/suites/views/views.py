@@ -7,6 +7,7 @@ the colors of the ground, of the inks or of skin, as dirt, wear and fingers have
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -44,26 +45,36 @@ class DrawnView:
     pitch_px: tuple[float, float] = PITCH_PX
 
 
+class SeenCells(NamedTuple):
+    """What is seen of a pattern, by the truth.
+
+    Attributes:
+        cells: wholly seen colored cells.
+        black_cells: wholly seen black and white ones.
+        motions: motions that put the colored ones into the pattern, the true one included; 0 without cells.
+        motions_of_parts: motions that put partly seen cells into the pattern, too.
+    """
+
+    cells: int
+    black_cells: int
+    motions: int
+    motions_of_parts: int
+
+
 @dataclass(frozen=True)
 class ViewResult:
     """The result of one view.
 
     Attributes:
         view: the view.
-        cells: wholly seen colored cells.
-        black_cells: wholly seen black and white ones.
-        motions: motions that put the colored ones into the pattern, the true one included.
-        motions_of_parts: motions that put partly seen cells into the pattern, too.
+        seen: what is seen.
         reported: markers with a position.
         wrong_ids: markers reported at another marker's place.
         reason: the reader's reason; empty without one.
     """
 
     view: DrawnView
-    cells: int
-    black_cells: int
-    motions: int
-    motions_of_parts: int
+    seen: SeenCells
     reported: int
     wrong_ids: int
     reason: str
@@ -75,23 +86,11 @@ class ViewResult:
 
 @dataclass(frozen=True, eq=False)
 class ShotView:
-    """The picture of a view.
-
-    Attributes:
-        pose: of the pattern.
-        picture: with its covers; ``visible`` are the markers away from them.
-        cells: wholly seen colored cells.
-        black_cells: wholly seen black and white ones.
-        motions: motions that put the colored ones into the pattern, the true one included; 0 without cells.
-        motions_of_parts: motions that put partly seen cells into the pattern, too.
-    """
+    """The picture of a view with its covers; ``visible`` are the markers away from them."""
 
     pose: Pose
     picture: CameraPicture
-    cells: int
-    black_cells: int
-    motions: int
-    motions_of_parts: int
+    seen: SeenCells
 
 
 def shoot_view(view: DrawnView) -> ShotView:
@@ -112,7 +111,7 @@ def shoot_view(view: DrawnView) -> ShotView:
     pattern = up_cells(picture.layout, cells)
     parts = up_cells(picture.layout, partly_seen_cells(picture, covers))
     motions, of_parts = (fitting_motions(pattern, some) if len(some) else 0 for some in (seen, parts))
-    return ShotView(pose, picture, len(seen), len(black), motions, of_parts)
+    return ShotView(pose, picture, SeenCells(len(seen), len(black), motions, of_parts))
 
 
 def read_view(view: DrawnView) -> ViewResult:
@@ -123,10 +122,7 @@ def read_view(view: DrawnView) -> ViewResult:
     markers = cached_extractor(pose.pattern, pose.layers, "balanced", pose.code).extract(shot.picture.image)
     return ViewResult(
         view=view,
-        cells=shot.cells,
-        black_cells=shot.black_cells,
-        motions=shot.motions,
-        motions_of_parts=shot.motions_of_parts,
+        seen=shot.seen,
         reported=int(markers.status.astype(bool).sum()),
         wrong_ids=int((marker_outcomes(shot.picture, markers) == WRONG_ID).sum()),
         reason=str(markers.reason or ""),

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,7 @@ def check_markers(
     stated_px: Mapping[str, float],
     scale: float = 1.0,
     limit_px: float | None = None,
+    **state: Any,
 ) -> CalibrateCheckDocument:
     """Compare pictures of the pad at rest with a calibrated rig.
 
@@ -67,6 +68,7 @@ def check_markers(
         stated_px: view -> RMS residual at the calibration; empty where the file does not tell.
         scale: residuals at the calibration over the stated deviations of the markers.
         limit_px: largest RMS residual; None: by the deviations.
+        state: the fields of the document that do not follow from residuals; see ``state.py``.
 
     Returns:
         The document; ``found`` is the tuple of the causes that explain the residuals and that the pictures do not tell
@@ -99,6 +101,7 @@ def check_markers(
         causes=parts,
         steps=tuple(STEPS[cause] for cause in likely),
         depth_error=depth_error if np.isfinite(depth_error) else None,
+        **state,
     )
 
 

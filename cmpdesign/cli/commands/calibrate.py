@@ -47,7 +47,13 @@ def camera(done: documents.calibration.CalibrateCameraDocument) -> None:
 )
 def check(done: documents.calibration.CalibrateCheckDocument) -> int:
     """Exit code 1: the calibration does not hold."""
-    print_rows(done, "rms_px stated_px misfit picture_misfits limit_px depth_error")
+    print_rows(
+        done, "cameras views force ages_days rms_px stated_px misfit picture_misfits limit_px depth_error"
+    )
+    told = [(name, camera.notes) for name, camera in done.cameras.items()]
+    for name, texts in [*told, *((name, view.hints) for name, view in done.views.items())]:
+        for text in texts:
+            print_warning(f"{name}: {text}")
     if done.holds:
         say("the calibration holds")
         return 0

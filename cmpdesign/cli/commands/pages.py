@@ -23,13 +23,14 @@ HostOption = Annotated[
     str, typer.Option(help="Address to listen on; another than 127.0.0.1 lets other machines use the page.")
 ]
 BrowserOption = Annotated[bool, typer.Option("--no-browser", help="Print the address only.")]
-PORT, HOST = 8300, "127.0.0.1"
 _END_S = 5.0  # for the last frame of a run
 _LOOK_S = 0.2
 
 
 @app.command(cls=Command, epilog=examples("cmpdesign studio", "cmpdesign studio --port 0 --no-browser"))
-def studio(port: PortOption = PORT, host: HostOption = HOST, no_browser: BrowserOption = False) -> None:
+def studio(
+    port: PortOption = 8300, host: HostOption = "127.0.0.1", no_browser: BrowserOption = False
+) -> None:
     """Design, check, make and read a pad in the browser.
 
     One line on standard output is the page's address; it holds the token without which no request is answered. The
@@ -61,8 +62,8 @@ def view(
         Path | None, typer.Option(help="The views, .toml: show the surface, as reconstruct does.")
     ] = None,
     contact: Annotated[Path | None, typer.Option(metavar="GEL", help="With --rig: show forces, too.")] = None,
-    port: PortOption = PORT,
-    host: HostOption = HOST,
+    port: PortOption = 8300,
+    host: HostOption = "127.0.0.1",
     no_browser: BrowserOption = False,
 ) -> None:
     """Show the markers of a camera, a video or pictures live in the browser; with a rig the surface and forces.

@@ -234,7 +234,9 @@ def test_the_cause_of_larger_residuals_is_named(change: str) -> None:
         name: [noisy(layout, changed(view), places, rng, 0.01) for view in views]
         for name in ("a.png", "b.png")
     }
-    found = check_markers(layout, Rig(views), rest, stated_px={})
+    found = check_markers(
+        layout, Rig(views), rest, stated_px={}, views={}, cameras={}, force=None, ages_days={}
+    )
     assert found.holds == (change == "nothing")
     assert found.found == likely
     assert {one.cause for one in found.causes if one.likely} == {*likely} - {LOCAL}

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import pickle
+import re
 import shutil
 import subprocess
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import date
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -295,6 +297,39 @@ def test_health_says_what_has_changed_since_the_rest(folder: Path, plug: Plug) -
     told = [text for text in told_events(folder / "run.mcap") if "of its brightness at rest" in text]
     assert len(told) == 1 and "check the light: the picture has" in told[0]
     assert EventKind.HEALTH in {one.kind for one in sensors.thumb.events}
+
+
+def test_a_check_by_the_own_camera(folder: Path, plug: Plug) -> None:
+    """The camera's answer, light, focus, share read, residuals, force scale and ages; a pad that has moved is named."""
+    path, shown, elastomer = (
+        folder / "thumb.toml",
+        [shot(seed=seed).image for seed in range(4)],
+        "[elastomer]\n",
+    )
+    elastomer += "thickness_mm = 4.0\nyoung_mpa = 0.3\nyoung_sigma_mpa = 0.02\n"
+    path.write_text(path.read_text() + elastomer + "[limits]\nmin_share_read = 0.99\n")
+    cv2.imwrite(str(folder / "rest.png"), shown[0])
+    cmpdesign.calibrate_rig(folder / "layout.json", path, folder / "rest.png", folder / "made.toml")
+    aged = re.sub(r"date = .*", "date = 2020-01-01", (folder / "made.toml").read_text())
+    (folder / "made.toml").write_text(aged)
+    plug(TimedCamera(lambda number: shown[number % len(shown)], FPS))
+    found = cmpdesign.calibrate_check(folder / "made.toml")
+    assert found.holds and 0.1 < found.misfit < 1.5 and found.causes
+    camera, view, force = found.cameras["camera 0"], found.views["camera"], found.force
+    assert camera.settings["exposure_ms"] == 4.0 and camera.settings["camera_size"] == (320, 240)
+    assert view.share_read == 1.0 and view.hints == () and 0.8 < view.blur_px < 1.5
+    assert view.evenness > 0.9 and view.clipping == 0.0 and view.contrast > 40
+    assert force is not None and (force.young_mpa, force.young_sigma_mpa, force.gel) == (0.3, 0.02, None)
+    assert found.ages_days == {"rig": (date.today() - date(2020, 1, 1)).days}
+    x, y = np.rint(shot().truth.marker_xy_px[40]).astype(int)
+    shown = [np.roll(image, 2, axis=1) for image in shown]
+    for image in shown:
+        cv2.circle(image, (int(x), int(y)), 10, (150, 150, 150), -1)
+    moved = cmpdesign.calibrate_check(folder / "made.toml")
+    assert not moved.holds and "the pad has moved against the camera" in [
+        c.cause for c in moved.causes if c.likely
+    ]
+    assert any("clean the window" in hint for hint in moved.views["camera"].hints)
 
 
 def told_events(path: Path) -> list[str]:
