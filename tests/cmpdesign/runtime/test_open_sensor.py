@@ -263,7 +263,7 @@ def test_health_says_what_has_changed_since_the_rest(folder: Path, plug: Plug) -
     plug(TimedCamera(lambda number: shown, FPS))
     with opened(folder / "thumb.toml") as sensors:
 
-        def health(image: Any, frames: int = 10) -> Any:
+        def health(image: Any, frames: int = 12) -> Any:  # of 16, two of which may be of the image before
             nonlocal shown
             shown = image
             count = sensors.thumb.count
