@@ -25,8 +25,7 @@ from cmpdesign.cli.terminal import (
 from cmpdesign.errors import OutputError
 
 __all__ = ["app", "main"]
-# The modules whose commands stand in no group have added these to ``app``.
-UNGROUPED = (making, pages, reading)
+UNGROUPED = (making, pages, reading)  # have added their commands to ``app``
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(datasets.export, name="export")
