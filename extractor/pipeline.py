@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -20,15 +19,15 @@ from extractor.cells.cell_mesh import CellMesh, build_cell_mesh
 from extractor.cells.cells import CODED_EFFORTS, EFFORTS, Cells, Effort, find_cells, has_color
 from extractor.cells.region_growing import grow
 from extractor.cells.triangle_fit import fit_edges, regions_as_cells
+from extractor.complete.finished_markers import finish_markers
 from extractor.complete.image_quality import (
     SampledCells,
-    measure_quality,
     measure_quality_without_numbers,
+    quality_of,
     sampled_cells,
 )
-from extractor.complete.repair import RepairedMarkers, repair_markers
 from extractor.complete.reported_share import is_less_than_half_reported
-from extractor.complete.row_breaks import beside_row_break, find_row_break
+from extractor.complete.row_breaks import NO_BREAK, beside_row_break, find_row_break
 from extractor.complete.virtual_markers import locate_virtual_markers
 from extractor.errors import LayoutError
 from extractor.image.input import Channels, convert_to_bgr
@@ -48,7 +47,7 @@ from extractor.presets import PRESETS, Preset
 from extractor.quality import Quality
 from extractor.refine.estimate import Appearance
 from extractor.refine.refiner import Refiner
-from extractor.refine.relief import points_without_parallax, without_parallax
+from extractor.refine.relief import points_without_parallax
 from extractor.result import VIRTUAL, Markers, Origin, Reason, VirtualMarkers
 
 WORK_PIXELS = 64_000  # of the smallest reduced scale, at which recognition is tried first; chosen, for time
@@ -287,25 +286,24 @@ class ImageReader:
         places, size, pad = numbered.places, pyramid.size, self._pads[numbered.pad]
         layout, topology = pad.layout, pad.topology
         refined = stages.record("refine", pad.refiner(pyramid, places, before))
-        repaired = repair_markers(refined, places, pad.lattice, size)
-        rows = find_row_break(topology, refined, repaired, size)
-        apparent = beside_row_break(rows, repaired)
-        parallax, repaired = refined.appearance.parallax, apparent
-        if parallax is not None:
-            flat = without_parallax(parallax, apparent.xy_px, apparent.cov_px2)
-            repaired = RepairedMarkers(*flat, apparent.status)
-        stages.record("repair", repaired)
+        full, cells = pyramid.level(1), pad.sampled_cells
+        found = finish_markers(full, refined, places, pad.lattice, topology, cells)
+        is_whole = found.are_all_measured and not found.jumps.is_broken
+        rows = NO_BREAK if is_whole else find_row_break(topology, found.jumps, found.repaired, size)
+        repaired = stages.record("repair", beside_row_break(rows, found.repaired))
+        parallax = refined.appearance.parallax
 
         def virtual() -> VirtualMarkers:
             points = refined.points[:, : layout.virtual_per_edge]
             if parallax is not None:
-                points = points_without_parallax(parallax, topology.edges, apparent.xy_px, points)
+                points = points_without_parallax(parallax, topology.edges, repaired.xy_px, points)
             return locate_virtual_markers(topology, repaired, points, refined.scatter)
 
-        few = is_less_than_half_reported(repaired.xy_px, layout.xy_mm, pad.lattice.present, size)
-        view, edges = pyramid.level(1), topology.edges
-        quality = measure_quality(view, pad.sampled_cells, repaired.xy_px, edges, refined.blur_px)
-        quality = stages.record("quality", replace(quality, row_fault=rows.fault, row_jump_px=rows.jump_px))
+        few = not is_whole and is_less_than_half_reported(
+            repaired.xy_px, layout.xy_mm, pad.lattice.present, size
+        )
+        quality = quality_of(found.cells, found.noise, found.edge_px, refined.blur_px, rows)
+        stages.record("quality", quality)
         markers = Markers.with_later(
             {VIRTUAL: virtual},
             xy_px=repaired.xy_px,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extractor._native import complete as native
+from extractor.complete.row_breaks import RowBreak
 from extractor.image.input import image_noise
 from extractor.image.pyramid import PyramidLevel
 from extractor.layout.reference import BLACK, COLORS, Reference
@@ -64,26 +65,6 @@ def _spread(color: NDArray[np.uint8]) -> NDArray[np.intp]:
     return np.concatenate(parts)
 
 
-def measure_quality(
-    view: PyramidLevel,
-    cells: SampledCells,
-    xy_px: NDArray[np.float64],
-    edges: NDArray[np.int32],
-    blur_px: float,
-) -> Quality:
-    """The quality of an image with numbered markers.
-
-    Args:
-        view: the image at full scale.
-        cells: by ``sampled_cells``.
-        xy_px: (M, 2) the markers, NaN where lost.
-        edges: (E, 2) the layout's edges.
-        blur_px: sigma of the blur.
-    """
-    found, noise, edge_px = native.measure_numbered(view, cells, xy_px, edges)
-    return _quality(found, blur_px, noise, edge_px)
-
-
 def measure_quality_without_numbers(view: PyramidLevel, edge_px: float) -> Quality:
     """The quality of an image in which no cell was numbered.
 
@@ -96,6 +77,17 @@ def measure_quality_without_numbers(view: PyramidLevel, edge_px: float) -> Quali
     return replace(UNKNOWN, clipping=clipping, noise=image_noise(view.image), edge_px=edge_px)
 
 
-def _quality(found: CellFigures, blur_px: float, noise: float, edge_px: float) -> Quality:
+def quality_of(found: CellFigures, noise: float, edge_px: float, blur_px: float, rows: RowBreak) -> Quality:
+    """The quality of an image with numbered markers, noise and edge as in ``FinishedMarkers``."""
     inks = ("", "") if math.isnan(found.contrast) else (COLORS[found.one], COLORS[found.other])
-    return Quality(blur_px, noise, found.contrast, inks, found.clipping, found.evenness, edge_px)
+    return Quality(
+        blur_px,
+        noise,
+        found.contrast,
+        inks,
+        found.clipping,
+        found.evenness,
+        edge_px,
+        rows.fault,
+        rows.jump_px,
+    )

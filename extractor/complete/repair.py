@@ -16,11 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor._native import complete as native
-from extractor.layout.lattice_tables import Lattice
-from extractor.numbering.marker_places import InitialMarkers
-from extractor.refine.estimate import RefinedMarkers
-
 
 class RepairedMarkers(NamedTuple):
     """Markers after repair.
@@ -33,17 +28,3 @@ class RepairedMarkers(NamedTuple):
     xy_px: NDArray[np.float64]
     cov_px2: NDArray[np.float64]
     status: NDArray[np.uint8]
-
-
-def repair_markers(
-    refined: RefinedMarkers, places: InitialMarkers, lattice: Lattice, size: tuple[int, int]
-) -> RepairedMarkers:
-    """Drop inconsistent markers, repair lost markers that the others predict, and combine uncertain markers with
-    predictions.
-
-    Args:
-        refined: the markers after refinement.
-        places: the markers before refinement.
-        size: width and height of the image, px; no marker is reported outside the image.
-    """
-    return native.repair_markers(refined, places, lattice.ring_tables, size)

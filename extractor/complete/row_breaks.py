@@ -14,7 +14,6 @@ Markers beside a break have a covariance that covers the jump, or are lost where
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,6 @@ from numpy.typing import NDArray
 from extractor._native import complete as native
 from extractor.complete.repair import RepairedMarkers
 from extractor.layout.topology import Topology
-from extractor.refine.estimate import RefinedMarkers
 from extractor.refine.extrapolated_pattern import extrapolate_pattern
 from extractor.result import Status
 
@@ -34,12 +32,6 @@ class RowBreakLimits(NamedTuple):
     """Limits of breaks. Lengths are in median edges, unless stated otherwise.
 
     Attributes:
-        min_jump: of a strip, for a break. Chosen: 0.4 px where an edge has 20.
-        ratio: of the largest jump along rows and that along columns. Chosen: pressed and twisted patterns have less
-            than 2.
-        min_usual_jump, usual_ratio: the same two limits of the RMS over all strips: where all rows are displaced, some
-            gridlines of the same picture jump along columns, too. Chosen: pictures with dirt, glare, motion blur and
-            scattered markers reach 0.03, or 2.1, but not both.
         spread, concentrated: a tear has this share of the squared jumps within that distance of their centre; else it
             is a rolling shutter. Chosen.
         beside: from the break, within which markers are not trusted. Chosen.
@@ -52,10 +44,6 @@ class RowBreakLimits(NamedTuple):
             that, the markers are covered and nothing is torn. Chosen.
     """
 
-    min_jump: float = 0.02
-    ratio: float = 3.0
-    min_usual_jump: float = 0.03
-    usual_ratio: float = 2.0
     spread: float = 2.0
     concentrated: float = 0.7
     beside: float = 0.75
@@ -79,16 +67,14 @@ class StripJumps(NamedTuple):
         edge_px: the median edge, 0 with few edges.
         rows_px: (B,) the length of the median jump of each strip of rows, beyond the disagreement of its gridlines; NaN
             with few gridlines.
-        largest_px, usual_px: the largest one, and the root mean square; NaN without any.
-        largest_column_px, usual_column_px: the same of strips of columns, with their disagreement.
+        largest_px: the largest one; NaN without any.
+        is_broken: rows jump more than columns do.
     """
 
     edge_px: float
     rows_px: Points
     largest_px: float
-    usual_px: float
-    largest_column_px: float
-    usual_column_px: float
+    is_broken: bool
 
 
 class RowBreak(NamedTuple):
@@ -112,24 +98,18 @@ NO_BREAK = RowBreak("", 0.0, np.empty(0), np.empty(0), 0.0)
 
 
 def find_row_break(
-    topology: Topology, refined: RefinedMarkers, markers: RepairedMarkers, size_px: tuple[int, int]
+    topology: Topology, jumps: StripJumps, markers: RepairedMarkers, size_px: tuple[int, int]
 ) -> RowBreak:
     """The break of an image along its rows.
 
     Args:
         topology: of the layout.
-        refined: the markers of the image before inconsistent ones were dropped: a break makes them inconsistent.
-        markers: of the image.
+        jumps, markers: of the image.
         size_px: width and height of the image.
     """
-    jumps = native.measure_jumps(refined.xy_px, topology)
     edge, largest = jumps.edge_px, jumps.largest_px
-    if edge == 0:
-        return NO_BREAK
-    is_one = largest > max(LIMITS.min_jump * edge, LIMITS.ratio * jumps.largest_column_px)
-    least = max(LIMITS.min_usual_jump * edge, LIMITS.usual_ratio * jumps.usual_column_px)
-    if math.isnan(jumps.largest_column_px) or not (is_one or jumps.usual_px > least):
-        return _lost_along_a_row(topology, markers, size_px, edge)
+    if not jumps.is_broken:
+        return NO_BREAK if edge == 0 else _lost_along_a_row(topology, markers, size_px, edge)
     rows = np.nan_to_num(jumps.rows_px)
     middle, squares = (np.arange(len(rows), dtype=np.float64) + 0.5) * native.STRIP_EDGES * edge, rows**2
     near = np.abs(middle - np.average(middle, weights=squares)) < LIMITS.spread * edge
@@ -173,8 +153,8 @@ def _lost_along_a_row(
     topology: Topology, markers: RepairedMarkers, size_px: tuple[int, int], edge: float
 ) -> RowBreak:
     """A tear beside which no marker is reported, across the whole pattern; nothing is lost so along a column."""
-    known = markers.status == Status.MEASURED
-    if np.count_nonzero(~known) < LIMITS.min_lost:
+    known = markers.status == Status.MEASURED.value
+    if len(known) - np.count_nonzero(known) < LIMITS.min_lost:
         return NO_BREAK
     xy = np.where(known[:, None], markers.xy_px, np.nan)
     place = np.where(known[:, None], xy, extrapolate_pattern(xy, topology).xy)

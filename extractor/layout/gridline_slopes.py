@@ -70,7 +70,7 @@ def slope_weights(
         ring = ring_markers[edges[:, at]]
         # a missing neighbour has no weight, whatever its id
         ids[:, block] = np.concatenate([np.where(ring >= 0, ring, marker), marker], axis=1)
-        of_ring = np.moveaxis(along @ stencil[edges[:, at]], 1, 0)
+        of_ring = np.moveaxis(along @ np.swapaxes(stencil[edges[:, at]], 1, 2), 1, 0)
         first, second = np.concatenate([of_ring, -of_ring.sum(axis=2, keepdims=True)], axis=2)
         (leave, arrive)[at][0, :, block] = first
         leave[1, :, block] = second * ((2.0, 1.0)[at] / -6.0)

@@ -41,7 +41,7 @@ class Topology(NamedTuple):
         ring_markers: (M, 18) int32, the markers in the two rings around each marker, the first ring first.
         ring_vectors: (M, 18, 2) float64, the layout vectors from a marker to its ``ring_markers``, in units of the
             mean edge, y up.
-        derivative_stencil: (M, 5, 18) float64, weights of the differences to the ``ring_markers`` that give the
+        derivative_stencil: (M, 18, 5) float64, weights of the differences to the ``ring_markers`` that give the
             map's derivatives x, y, xx, xy, yy by least squares: the first ones of a cubic, or of a quadratic where only
             three rows of markers are there, as at the rim; the second ones of a quadratic through all of them, which
             noise and scatter change least. 0 with fewer than 8 markers.
@@ -205,7 +205,7 @@ def _two_rings(ring: NDArray[np.int32]) -> NDArray[np.int32]:
 def _derivative_stencil(
     ring_markers: NDArray[np.int32], ring_vectors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(M, 5, 18) float64, see ``Topology.derivative_stencil``."""
+    """(M, 18, 5) float64, see ``Topology.derivative_stencil``."""
     known: NDArray[np.bool_] = np.asarray(ring_markers >= 0)
     x, y = ring_vectors[..., 0], ring_vectors[..., 1]
     quadratic = np.stack([x, y, x * x / 2, x * y, y * y / 2], axis=2)
@@ -225,7 +225,7 @@ def _derivative_stencil(
     for terms, weight, added, rows in fits:
         solutions, regular = _least_squares(terms[enough], weight[enough], added, rows)
         out[enough[regular], rows] = solutions
-    return out
+    return np.ascontiguousarray(np.swapaxes(out, 1, 2))
 
 
 def _least_squares(

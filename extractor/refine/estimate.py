@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -39,19 +39,6 @@ class Appearance(NamedTuple):
     levels: InkLevels
     pixel_noise: float
     parallax: Parallax | None = None
-
-    def with_lighting(self, before: NDArray[np.float64], now: NDArray[np.float64]) -> Appearance:
-        """The appearance in another light.
-
-        Args:
-            before, now: (2, 3) mean light of some cells over black, and of their black, in the previous and in the
-                present image.
-        """
-        gain = now[0] / np.maximum(before[0], 1e-9)
-        black = self.levels.black.copy()
-        black[:, 0] += now[1] - before[1]
-        cell, slope = self.levels.cell * gain, self.levels.slope * gain[:, None]
-        return self._replace(levels=self.levels._replace(cell=cell, slope=slope, black=black))
 
     def is_similar(self, other: Appearance) -> bool:
         """Whether blur and levels are nearly the same."""
@@ -119,17 +106,9 @@ class RefinedMarkers:
         """
         return measure.virtual_markers(self.reading, self.appearance.scale)
 
-
-class UnevenDotGain(NamedTuple):
-    """Changes of the dot gain over the image beyond what noise explains, px/px, 0 or more.
-
-    Attributes:
-        outward: with the distance from the image's middle.
-        across: from one side of the image to the other.
-    """
-
-    outward: float
-    across: float
+    def with_parallax(self, parallax: Parallax) -> RefinedMarkers:
+        """The same with another parallax of the cells."""
+        return replace(self, appearance=self.appearance._replace(parallax=parallax))
 
 
 class EdgeContrasts(NamedTuple):
@@ -197,26 +176,3 @@ class FirstEstimate(NamedTuple):
             levels=self.levels._replace(slope=self.levels.slope / ratio),
             contrasts=self.contrasts._replace(clearance=clearance),
         )
-
-
-class MeasuredImage(NamedTuple):
-    """The markers after the steps by synthesis, and what the image then shows.
-
-    Attributes:
-        xy_px, cov_px2, explained, reading: as in ``RefinedMarkers``.
-        sigma: the blur, px at the scale of the steps.
-        noise, pixel_noise, levels: as in ``Appearance``.
-        uneven_dot_gain: changes of the dot gain over the image.
-        scatter: of the markers, at the scale of the steps.
-    """
-
-    xy_px: NDArray[np.float64]
-    cov_px2: NDArray[np.float64]
-    explained: NDArray[np.bool_]
-    reading: GridlineReading
-    sigma: float
-    noise: float
-    pixel_noise: float
-    levels: InkLevels
-    uneven_dot_gain: UnevenDotGain
-    scatter: MarkerScatter

@@ -7,12 +7,9 @@ One such step is nearly enough.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
-from extractor._native import measure
 from extractor._native import refine as native
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.layout.topology import Topology
@@ -20,7 +17,7 @@ from extractor.numbering.marker_places import InitialMarkers
 from extractor.presets import SCHEDULES, Preset
 from extractor.refine.estimate import Appearance, FirstEstimate, RefinedMarkers
 from extractor.refine.measure.gridline_weights import short_edge
-from extractor.refine.relief import Parallax, find_parallax, unknown_parallax
+from extractor.refine.relief import find_parallax
 
 SHARP_SIGMA_PX = 1.15  # blur of an image in focus; at half its scale such an image is looked at first. Chosen
 SMALL_BLUR = 0.12  # of an edge; above, one edge is blurred into the next. Chosen
@@ -53,21 +50,21 @@ class Refiner:
             before: the appearance of the previous image of a sequence, whose parallax is kept: a contact must not
                 move it, as all displacements would change.
         """
-        refined = self._refined(pyramid, places, before)
-        if before is None or before.parallax is None:
-            return refined
-        return replace(refined, appearance=refined.appearance._replace(parallax=before.parallax))
-
-    def _refined(self, pyramid: Pyramid, places: InitialMarkers, before: Appearance | None) -> RefinedMarkers:
-        """The same with the parallax of this image."""
         usual_edge = short_edge(places.xy_px, self._topology.edges, SHORT_RARITY)
-        if before is not None and before.scale == self._reduction_scale(
-            before.scale * before.sigma, usual_edge
-        ):
+        if before is None:
+            return self._refined(pyramid, places, usual_edge)
+        if before.scale == self._reduction_scale(before.scale * before.sigma, usual_edge):
             view = pyramid.level(before.scale)
-            refined = self.measured(view, self.first_estimate(view, places, places.xy_px, before))
+            refined = native.refined_again(
+                view, self._topology, places, before, self._schedule, self._stations
+            )
             if refined.appearance.is_similar(before):
                 return refined
+        refined = self._refined(pyramid, places, usual_edge)
+        return refined if before.parallax is None else refined.with_parallax(before.parallax)
+
+    def _refined(self, pyramid: Pyramid, places: InitialMarkers, usual_edge: float) -> RefinedMarkers:
+        """The same for an image whose appearance is not known."""
         view = pyramid.level(min(self._reduction_scale(SHARP_SIGMA_PX, usual_edge), 2))
         first = self.first_estimate(view, places, places.xy_px)
         scale = self._reduction_scale(view.scale * first.sigma, usual_edge)
@@ -86,44 +83,22 @@ class Refiner:
         return max(1, scale)
 
     def first_estimate(
-        self,
-        view: PyramidLevel,
-        places: InitialMarkers,
-        start: NDArray[np.float64],
-        before: Appearance | None = None,
+        self, view: PyramidLevel, places: InitialMarkers, start: NDArray[np.float64]
     ) -> FirstEstimate:
-        """The levels of the inks, the blur, and the round of profiles.
-
-        Args:
-            view: the image.
-            places: of the full image.
-            start: (M, 2) px in the full image, where the profiles are.
-            before: the appearance of the previous image of a sequence.
+        """The levels of the inks, the blur, and the round of profiles, which are at start (M, 2) px in the full image;
+        so are the places.
         """
-        rows = self._schedule.max_profile_rows
-        return native.first_estimate(view, self._topology, start, places, before, rows)
+        return native.first_estimate(
+            view, self._topology, start, places, None, self._schedule.max_profile_rows
+        )
 
     def measured(self, view: PyramidLevel, first: FirstEstimate) -> RefinedMarkers:
         """The markers after the steps by synthesis, in the full image. A lost marker on which all triangles agree
         lies where these put it.
         """
-        remainder = self._schedule.small_remainder
-        found = native.measure_image(view, self._topology, first, remainder, self._stations)
-        scale = view.scale
-        size_px = scale * np.array(view.image.shape[1::-1], dtype=np.float64)
-        if self._topology.cell_height != 0.0:
-            points = measure.virtual_markers(found.reading, scale)[..., :2]
-            parallax: Parallax | None = find_parallax(self._topology, found.xy_px, points, size_px)
-        else:
-            parallax = unknown_parallax(*found.uneven_dot_gain, size_px)
-        look = found.sigma, found.noise, found.levels, found.pixel_noise
-        return RefinedMarkers(
-            xy_px=found.xy_px,
-            cov_px2=found.cov_px2,
-            explained=found.explained,
-            blur_px=scale * found.sigma,
-            noise=scale * found.noise,
-            appearance=Appearance(scale, *look, parallax),
-            reading=found.reading,
-            scatter=found.scatter.at_scale(scale),
-        )
+        refined = native.refined_markers(view, self._topology, first, self._schedule, self._stations)
+        if self._topology.cell_height == 0.0:
+            return refined
+        size_px = view.scale * np.array(view.image.shape[1::-1], dtype=np.float64)
+        points = refined.points[..., :2]
+        return refined.with_parallax(find_parallax(self._topology, refined.xy_px, points, size_px))

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from extractor._native import refine as native
 from extractor.layout.topology import Topology
 
 Points = NDArray[np.float64]
@@ -30,26 +31,18 @@ class ReliefLimits(NamedTuple):
             over the image's width. Derived: the parallax is 2 tan(half of the field of view) / index, 0.7 to 2 for 50
             to 90 degrees through air or gel; walls alone shift by half of it, with shadows on the same side by all
             of it. The middle of 0.4 to 1.6, and the deviation of a uniform distribution there.
-        foot_deviation: of the foot from the image's middle, in widths of the image: a tilt of 20 degrees. Chosen.
         rounds, grid, grid_reach: rounds of places that are tried for the foot, places along each axis, and their reach
             in deviations of the prior, or of the foot after the round before. Chosen.
         correlated: gridlines whose errors are alike; the evidence counts by one of so many. Chosen.
-        unseen: the deviation of the shift of markers without a known height, in units of the change of the cells'
-            size by the distance from the foot. Derived: with independent uniform shares of both kinds of sides, half
-            of their sum departs from its mean as much as half of their difference, and the mean over directions of
-            the parallax along a normal is 2 / pi of it: pi / 2. Measured: 1.7 to 3.3 on recessed and raised pads of
-            `python -m benchmarks.photoreal`.
         min_gridlines: with fewer, the foot has its prior. Chosen.
     """
 
     rate: float = 1.0
     rate_deviation: float = 0.35
-    foot_deviation: float = 0.25
     rounds: int = 2
     grid: int = 15
     grid_reach: float = 3.0
     correlated: float = 8.0
-    unseen: float = 2.0
     min_gridlines: int = 30
 
 
@@ -75,9 +68,9 @@ class Parallax(NamedTuple):
 
     def cov_px2(self, xy_px: Points) -> Points:
         """(N, 2, 2) of the shift at points (N, 2)."""
-        away = xy_px - self.foot_px
-        along = away[:, :, None] * away[:, None, :]
-        return self.rate_deviation**2 * (along + self.foot_cov_px2) + self.rate**2 * self.foot_cov_px2
+        away = self.rate_deviation * (xy_px - self.foot_px)
+        of_foot = (self.rate_deviation**2 + self.rate**2) * self.foot_cov_px2
+        return away[:, :, None] * away[:, None, :] + of_foot
 
 
 def find_parallax(topology: Topology, xy_px: Points, points_px: Points, size_px: Points) -> Parallax:
@@ -100,11 +93,11 @@ def find_parallax(topology: Topology, xy_px: Points, points_px: Points, size_px:
     if known.sum() < LIMITS.min_gridlines:
         known[:] = False
     place, sign = ends.mean(axis=1)[known] - middle_px, float(np.sign(topology.cell_height))
-    foot, deviations_px = np.zeros(2), np.full(2, LIMITS.foot_deviation * width_px)
+    foot, deviations_px = np.zeros(2), np.full(2, native.FOOT_DEVIATION * width_px)
     for _ in range(LIMITS.rounds):
         steps = np.linspace(-LIMITS.grid_reach, LIMITS.grid_reach, LIMITS.grid)
         feet = foot + np.stack(np.meshgrid(*steps * deviations_px[:, None]), axis=-1).reshape(-1, 2)
-        log_share = -0.5 * (feet**2).sum(axis=1) / (LIMITS.foot_deviation * width_px) ** 2
+        log_share = -0.5 * (feet**2).sum(axis=1) / (native.FOOT_DEVIATION * width_px) ** 2
         log_share += _log_likelihood(feet, place, normal[known], outward[known], sign)
         share = np.exp(log_share - log_share.max())
         share /= share.sum()
@@ -115,30 +108,10 @@ def find_parallax(topology: Topology, xy_px: Points, points_px: Points, size_px:
     return Parallax(foot + middle_px, cov, LIMITS.rate * height, LIMITS.rate_deviation * abs(height))
 
 
-def unknown_parallax(outward: float, across: float, size_px: Points) -> Parallax | None:
-    """The parallax of cells of unknown height: a shift of mean 0; None where the cells' sizes do not change.
-
-    Args:
-        outward, across: px/px, by which the displacement of the cells' sides changes with the distance from the
-            image's middle, and from one side of the image to the other. The second shows a foot beside the middle.
-        size_px: (2,) width and height of the image.
-    """
-    slope = float(np.hypot(outward, across))
-    if slope == 0.0:
-        return None
-    foot_px = LIMITS.foot_deviation * size_px[0] * across / slope
-    return Parallax(0.5 * (size_px - 1.0), foot_px**2 * np.eye(2), 0.0, LIMITS.unseen * slope)
-
-
-def without_parallax(parallax: Parallax, xy_px: Points, cov_px2: Points) -> tuple[Points, Points]:
-    """Markers (M, 2) and covariances (M, 2, 2) in the plane of the black."""
-    return xy_px - parallax.shift_px(xy_px), cov_px2 + parallax.cov_px2(xy_px)
-
-
 def points_without_parallax(
     parallax: Parallax, edges: NDArray[np.int32], xy_px: Points, points_px: Points
 ) -> Points:
-    """Points (E, m, 3) of gridlines (E, 2) in the plane of the black; xy (M, 2) are the markers as they appear.
+    """Points (E, m, 3) of gridlines (E, 2) in the plane of the black; xy (M, 2) are the markers there.
 
     The variance of a point is across its gridline.
     """

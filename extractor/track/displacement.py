@@ -48,6 +48,9 @@ class Rest:
         return mapped(self.layout_from_image, xy_px) - mapped(self.layout_from_image, self.xy_px)
 
 
+NO_REST = Rest(np.full(2, np.nan), None, None, float("nan"))
+
+
 def fit_rest(xy_px: Points, reference: Reference, mm_per_px: float | None = None) -> Rest:
     """The rest state with its markers at (M, 2) px, NaN where lost.
 

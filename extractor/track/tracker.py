@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from extractor._native import track as native
 from extractor.contact import ContactForce
 from extractor.errors import ImageError
+from extractor.frozen_record import LateRecord
 from extractor.image.input import Channels
 from extractor.image.pyramid import Pyramid, PyramidLevel
 from extractor.image.response import Response
@@ -22,7 +23,7 @@ from extractor.presets import Preset
 from extractor.refine.estimate import Appearance
 from extractor.refine.measure.gridline_weights import SHORTEST_RARITY, short_edge
 from extractor.result import Markers, Origin, Reason, Status
-from extractor.track.displacement import Rest, fit_rest
+from extractor.track.displacement import NO_REST, Rest, fit_rest
 from extractor.track.warm_start import SeenCells, TrackState, WarmStart, seen_cells
 from extractor.track.warm_tables import WarmTables, build_warm_tables
 
@@ -54,8 +55,8 @@ class StartKind(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
-    """The result of one frame.
+class Tracked(LateRecord):
+    """The result of one frame. Displacements are computed when they are first asked for.
 
     Attributes:
         index: place in the sequence, from 0.
@@ -165,7 +166,7 @@ class Tracker:
         if warm is not None:
             return warm
         markers, appearance = self._reader.read_pyramid(pyramid, stages)
-        if not markers.found:
+        if not markers.found or appearance is None:
             if (
                 self._state is not None
             ):  # the next frame may start from these positions, but not from velocities
@@ -173,9 +174,8 @@ class Tracker:
             return markers, None
         if self._tables is not None and pyramid is not None:
             view = self._level_of_check(pyramid, markers.xy_px)
-            cells = seen_cells(pyramid.level(1), view, markers.xy_px, self._tables)
-            count = int((markers.status == Status.MEASURED).sum())
-            self._update_state(markers, appearance, cells, count, 0)
+            cells = seen_cells(view, markers.xy_px, self._tables)
+            self._update_state(markers, appearance, cells, _measured(markers), None)
             markers = self._settle(pyramid, markers)
         return markers, StartKind.COLD
 
@@ -218,39 +218,36 @@ class Tracker:
         numbered = NumberedMarkers(
             start.places, state.mirrored, Origin.PREVIOUS if start.by_rim else Origin.WHITE
         )
-        before = state.appearance and state.appearance.with_lighting(state.cells.light, start.light)
+        before = state.appearance._replace(levels=start.ink_levels)
         markers, appearance = self._reader.finish(pyramid, numbered, stages, before)
-        count = int((markers.status == Status.MEASURED).sum())
-        if count < MIN_KEPT_SHARE * state.expected_count:
+        known = _measured(markers)
+        if appearance is None or np.count_nonzero(known) < MIN_KEPT_SHARE * state.expected_count:
             return None
-        expected, age = max(count, state.expected_count), state.frames_since_cold + 1
-        view = self._level_of_check(pyramid, markers.xy_px)
-        shift_px = native.resting_shifts(view, markers.xy_px, tables, start.levels)
-        cells = SeenCells(start.levels, start.light, shift_px)
-        self._update_state(markers, appearance, cells, expected, age)
+        self._update_state(markers, appearance, start.cells, known, state)
         return markers, StartKind.RIM if start.by_rim else StartKind.WARM
 
     def _update_state(
         self,
         markers: Markers,
-        appearance: Appearance | None,
+        appearance: Appearance,
         cells: SeenCells,
-        expected_count: int,
-        frames_since_cold: int,
+        known: NDArray[np.bool_],
+        start: TrackState | None,
     ) -> None:
-        last = self._state
-        if appearance is not None and last is not None and last.appearance is not None:
+        """Keep a frame; start is the state that it started from, None for a cold start."""
+        last, count = self._state, int(np.count_nonzero(known))
+        if last is not None:
             # cells above or below the black: the parallax of the first frame, also after a cold start
             appearance = appearance._replace(parallax=last.appearance.parallax)
         self._state = TrackState(
             xy_px=markers.xy_px,
-            known=markers.status == Status.MEASURED,
+            known=known,
             previous_px=last.xy_px if last is not None and not last.is_before_gap else None,
             cells=cells,
             appearance=appearance,
             mirrored=bool(markers.mirrored),
-            expected_count=expected_count,
-            frames_since_cold=frames_since_cold,
+            expected_count=count if start is None else max(count, start.expected_count),
+            frames_since_cold=0 if start is None else start.frames_since_cold + 1,
         )
 
     def _make_tracked(
@@ -262,16 +259,18 @@ class Tracker:
         markers: Markers,
         elapsed_ms: float,
     ) -> Tracked:
-        unknown = np.full_like(markers.xy_px, np.nan)
-        frame = Tracked(
+        rest = self.rest or NO_REST
+        frame = Tracked.with_later(
+            {
+                ("displacement_px",): lambda: [rest.displacement_px(markers.xy_px)],
+                ("displacement_mm",): lambda: [rest.displacement_mm(markers.xy_px)],
+            },
             index=self._count,
             time_s=time_s,
             status=status,
             reason=reason,
             start=start,
             markers=markers,
-            displacement_px=unknown if self.rest is None else self.rest.displacement_px(markers.xy_px),
-            displacement_mm=unknown if self.rest is None else self.rest.displacement_mm(markers.xy_px),
             elapsed_ms=elapsed_ms,
         )
         self._count += 1
@@ -281,3 +280,8 @@ class Tracker:
         height, width = np.shape(image)[:2]
         assert self._size is not None
         return f"{width} x {height} px instead of {self._size[1]} x {self._size[0]} px"
+
+
+def _measured(markers: Markers) -> NDArray[np.bool_]:
+    """(M,) the markers that are measured."""
+    return np.asarray(markers.status == Status.MEASURED.value)

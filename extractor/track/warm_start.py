@@ -11,6 +11,7 @@ from extractor._native import track as native
 from extractor.image.pyramid import PyramidLevel
 from extractor.numbering.marker_places import InitialMarkers
 from extractor.refine.estimate import Appearance
+from extractor.refine.synthesis.ink_levels import InkLevels
 from extractor.track.warm_tables import WarmTables
 
 
@@ -20,13 +21,12 @@ class SeenCells(NamedTuple):
     Attributes:
         levels: (2, C, 3) float64 BGR, each cell's ink level minus the black around the cell, and this black.
         light: (2, 3) float64, the mean light of the cells over black, and of their black, 0 to 255.
-        shift_px: (C, 2) float64, px at the scale of the next check, from each cell's middle to the centroid of its ink;
-            0 where there is too little ink.
+        ink_px: (C, 2) float64, px, the centroid of each cell's ink; NaN where there is too little ink.
     """
 
     levels: NDArray[np.float64]
     light: NDArray[np.float64]
-    shift_px: NDArray[np.float64]
+    ink_px: NDArray[np.float64]
 
 
 class TrackState(NamedTuple):
@@ -37,7 +37,7 @@ class TrackState(NamedTuple):
         known: (M,) bool, the measured markers.
         previous_px: (M, 2) float64, the markers of the previous frame; None where that frame was lost.
         cells: as the frame shows them.
-        appearance: of the image, for refinement; None where no pattern was found.
+        appearance: of the image, for refinement.
         mirrored: the image shows the pattern's back.
         expected_count: largest number of measured markers since the last cold start.
         frames_since_cold: number of frames since the last cold start.
@@ -48,7 +48,7 @@ class TrackState(NamedTuple):
     known: NDArray[np.bool_]
     previous_px: NDArray[np.float64] | None
     cells: SeenCells
-    appearance: Appearance | None
+    appearance: Appearance
     mirrored: bool
     expected_count: int
     frames_since_cold: int
@@ -60,24 +60,22 @@ class WarmStart(NamedTuple):
 
     Attributes:
         places: the markers before refinement.
-        levels, light: as in ``SeenCells``; of cells that are not proved, the levels of the previous frame.
+        cells: as this frame shows them; of those that are not proved, the levels of the previous frame.
+        ink_levels: those of the previous frame's appearance, in the light of this frame.
         by_rim: the white cell is hidden, and the rim proved the numbering.
     """
 
     places: InitialMarkers
-    levels: NDArray[np.float64]
-    light: NDArray[np.float64]
+    cells: SeenCells
+    ink_levels: InkLevels
     by_rim: bool
 
 
-def seen_cells(
-    view: PyramidLevel, reduced: PyramidLevel, xy_px: NDArray[np.float64], tables: WarmTables
-) -> SeenCells:
+def seen_cells(view: PyramidLevel, xy_px: NDArray[np.float64], tables: WarmTables) -> SeenCells:
     """What an image shows of the cells of numbered markers. Cells that are not seen have the mean levels of their ink.
 
     Args:
-        view: the full image.
-        reduced: the same at the scale of the next check.
+        view: the image at the scale of the next check.
         xy_px: (M, 2), NaN where lost.
     """
-    return native.seen_cells(view, reduced, xy_px, tables)
+    return native.seen_cells(view, xy_px, tables)

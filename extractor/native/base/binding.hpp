@@ -197,6 +197,14 @@ nb::object to_python(T value) {
   return nb::cast(value);
 }
 
+template <NamedRecord T>
+nb::object to_python(T&& record);
+
+template <class T>
+nb::object to_python(std::optional<T>&& value) {
+  return value ? to_python(std::move(*value)) : nb::none();
+}
+
 // A record as an object of its class in Python, made with the names of the fields.
 template <NamedRecord T>
 nb::object to_python(T&& record) {
@@ -216,11 +224,6 @@ nb::object to_python(T&& record) {
   PyObject* object = PyObject_Vectorcall(made_class, items.data(), 0, field_names<T>());
   if (object == nullptr) throw nb::python_error();
   return nb::steal(object);
-}
-
-template <class T>
-nb::object to_python(std::optional<T>&& value) {
-  return value ? to_python(std::move(*value)) : nb::none();
 }
 
 template <class... T>

@@ -26,7 +26,6 @@ constexpr double LAB_STRAIGHT = 0.008856451679035631;  // (6 / 29)^3
 constexpr double LAB_SLOPE = 7.787037037037035;        // (29 / 6)^2 / 3
 constexpr double LAB_OFFSET = 4.0 / 29.0;
 
-using numeric::BATCH_POINTS;
 using Lights = std::array<double, CHANNELS>;  // BGR
 
 double sum(const Lights& light) { return light[0] + light[1] + light[2]; }
@@ -80,28 +79,18 @@ struct CellValues {
   CellValues(View<const std::uint8_t, 3> image, View<const double, 2> centre,
              View<const std::uint8_t, 1> color, double radius, double clipped_value)
       : values({COLORS, CHANNELS, centre.size()}) {
-    auto buffers = numeric::allocate_sample_buffers();
-    for (Index first = 0; first < centre.size(); first += BATCH_POINTS) {
-      const auto points = centre.slice(first, std::min(first + BATCH_POINTS, centre.size()));
-      const auto patches = buffers.patches.view();
-      for (Index i = 0; i < points.size(); ++i) {
-        patches[numeric::X + i] = points(i, 0);
-        patches[numeric::Y + i] = points(i, 1);
-        patches[numeric::RADIUS + i] = radius;
-      }
-      numeric::fill_patch_means(image.flat(), image.size(0), image.size(1), points.size(), buffers);
-      for (Index i = 0; i < points.size(); ++i)
-        if (patches[numeric::INSIDE + i] > 0.0)
-          add(patches.from(numeric::COLOR + i), color[first + i], clipped_value);
-    }
+    Array<numeric::Patch, 1> patches({centre.size()});
+    for (Index i = 0; i < centre.size(); ++i) patches[i] = {centre(i, 0), centre(i, 1), radius};
+    const Array<double, 2> means = numeric::patch_means(image, patches);
+    for (Index i = 0; i < centre.size(); ++i)
+      if (means(i, 3) > 0.0) add(means[i], color[i], clipped_value);
   }
 
-  // Adds the value of a cell, of which the channels lie BATCH_POINTS apart.
   void add(View<const double, 1> own, Index k, double clipped_value) {
     const Index place = count[k]++;
     double largest = 0.0;
     for (Index channel = 0; channel < CHANNELS; ++channel) {
-      const double value = own[channel * BATCH_POINTS];
+      const double value = own[channel];
       values(k, channel, place) = value;
       largest = std::max(largest, value);
     }

@@ -12,8 +12,6 @@ namespace cmp::complete {
 namespace {
 
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-// Status in extractor/result.py
-constexpr std::uint8_t LOST = 0, MEASURED = 1, REPAIRED = 2, FITTED = 3;
 
 using layout::RingTables;
 using localmap::MarkerPredictions;

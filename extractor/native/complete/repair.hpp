@@ -10,9 +10,12 @@
 #include "complete/uncertain_markers.hpp"
 #include "layout/lattice_tables.hpp"
 #include "layout/neighbour_tables.hpp"
-#include "refine/estimate.hpp"
+#include "refine/first_estimate.hpp"
 
 namespace cmp::complete {
+
+// Status in extractor/result.py
+inline constexpr std::uint8_t LOST = 0, MEASURED = 1, REPAIRED = 2, FITTED = 3;
 
 // Limits of repaired markers. Distances and deviations are in edges, unless stated otherwise.
 //
@@ -52,13 +55,21 @@ struct RepairLimits {
   UncertainLimits uncertain;
 };
 
+// Of the appearance of an image.
+struct SeenAppearance {
+  std::optional<refine::KnownParallax> parallax;  // of cells above or below the black
+
+  CMP_RECORD("extractor.refine.estimate.Appearance", parallax)
+};
+
 // The M markers after refinement.
 struct RefinedMarkers {
   View<const double, 2> xy_px;    // (M, 2) NaN where not measured
   View<const double, 3> cov_px2;  // (M, 2, 2) NaN where not measured
   View<const bool, 1> explained;  // (M,) synthesis explains the image around the marker
+  SeenAppearance appearance;
 
-  CMP_RECORD("extractor.refine.estimate.RefinedMarkers", xy_px, cov_px2, explained)
+  CMP_RECORD("extractor.refine.estimate.RefinedMarkers", xy_px, cov_px2, explained, appearance)
 };
 
 // The markers after repair; the Python class explains them.

@@ -106,11 +106,14 @@ Array<double, 1> jumps_along(const std::vector<Gridline>& lines, int axis, doubl
     const double dx = median(apart);
     for (std::size_t i = 0; i < count; ++i) apart[i] = y[next[s] + i];
     const double dy = median(apart);
-    for (std::size_t i = 0; i < count; ++i) {
-      const double from_x = x[next[s] + i] - dx, from_y = y[next[s] + i] - dy;
-      apart[i] = from_x * from_x + from_y * from_y;
+    double beyond = dx * dx + dy * dy;
+    if (disagreement > 0.0) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const double from_x = x[next[s] + i] - dx, from_y = y[next[s] + i] - dy;
+        apart[i] = from_x * from_x + from_y * from_y;
+      }
+      beyond -= disagreement * median(apart);
     }
-    const double beyond = dx * dx + dy * dy - disagreement * median(apart);
     jump[static_cast<Index>(s)] = std::sqrt(std::max(beyond, 0.0));
   }
   return jump;
@@ -134,12 +137,14 @@ StripJumps measure_jumps(View<const double, 2> xy, const layout::Topology& topol
   std::vector<double> lengths;
   const auto lines = gridlines_of(xy, topology, limits, lengths);
   if (static_cast<Index>(lengths.size()) < limits.min_gridlines)
-    return {0.0, Array<double, 1>({0}), NONE, NONE, NONE, NONE};
+    return {0.0, Array<double, 1>({0}), NONE, false};
   const double edge = median(lengths);
   Array<double, 1> rows = jumps_along(lines, 1, edge, limits.disagreement, limits);
   const auto [largest, usual] = largest_and_usual(rows);
   const auto [largest_column, usual_column] = largest_and_usual(jumps_along(lines, 0, edge, 0.0, limits));
-  return {edge, std::move(rows), largest, usual, largest_column, usual_column};
+  const bool is_one = largest > std::max(limits.min_jump * edge, limits.ratio * largest_column);
+  const bool are_all = usual > std::max(limits.min_usual_jump * edge, limits.usual_ratio * usual_column);
+  return {edge, std::move(rows), largest, !std::isnan(largest_column) && (is_one || are_all)};
 }
 
 }  // namespace cmp::complete

@@ -17,16 +17,24 @@ struct JumpLimits {
   // square: all gridlines across a break jump alike, beside dirt and in a contact they do not. Chosen: with 2
   // and with 4 the same tears are found, and none in pictures with dirt, glare or contact.
   double disagreement = 2.0;
+  double min_jump = 0.02;  // of a strip, for a break. Chosen: 0.4 px where an edge has 20.
+  // of the largest jump along rows and that along columns, for a break. Chosen: pressed and twisted patterns
+  // have less than 2.
+  double ratio = 3.0;
+  // the same two limits of the RMS over all strips: where all rows are displaced, some gridlines of the same
+  // picture jump along columns, too. Chosen: pictures with dirt, glare, motion blur and scattered markers
+  // reach 0.03, or 2.1, but not both.
+  double min_usual_jump = 0.03, usual_ratio = 2.0;
 };
 
 // The jumps of an image; the Python class explains them.
 struct StripJumps {
   double edge_px;
   Array<double, 1> rows_px;  // (B,)
-  double largest_px, usual_px, largest_column_px, usual_column_px;
+  double largest_px;
+  bool is_broken;
 
-  CMP_RECORD("extractor.complete.row_breaks.StripJumps", edge_px, rows_px, largest_px, usual_px,
-             largest_column_px, usual_column_px)
+  CMP_RECORD("extractor.complete.row_breaks.StripJumps", edge_px, rows_px, largest_px, is_broken)
 };
 
 // xy (M, 2) px, NaN where not measured.

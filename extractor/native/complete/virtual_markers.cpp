@@ -124,7 +124,7 @@ class MarkerWeights {
 
   // whether the map at marker m is that of the stencil, through known markers
   bool is_by_stencil(Index m) const {
-    if (topology_.derivative_stencil(m, 0, 0) == 0.0 && topology_.derivative_stencil(m, 0, 1) == 0.0)
+    if (topology_.derivative_stencil(m, 0, 0) == 0.0 && topology_.derivative_stencil(m, 1, 0) == 0.0)
       return false;
     for (const std::int32_t n : topology_.ring_markers[m])
       if (n >= 0 && !ends_.known[n]) return false;
@@ -163,11 +163,12 @@ class MarkerWeights {
     const double u = topology_.edge_vectors(e, 0), v = topology_.edge_vectors(e, 1);
     const auto stencil = topology_.derivative_stencil[m];
     double total = 0.0;
-    for (Index k = 0; k < stencil.size(1); ++k) {
+    for (Index k = 0; k < stencil.size(0); ++k) {
       const std::int32_t n = topology_.ring_markers(m, k);
       if (n < 0) continue;
-      const double curving = u * u * stencil(2, k) + 2 * u * v * stencil(3, k) + v * v * stencil(4, k);
-      const double weight = first * (u * stencil(0, k) + v * stencil(1, k)) + second * curving;
+      const auto by = stencil[k];
+      const double curving = u * u * by[2] + 2 * u * v * by[3] + v * v * by[4];
+      const double weight = first * (u * by[0] + v * by[1]) + second * curving;
       add(n, weight);
       total += weight;
     }

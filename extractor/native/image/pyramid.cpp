@@ -41,6 +41,15 @@ Array<double, 2> PyramidLevel::to_level(View<const double, 2> xy_px) const {
   return out;
 }
 
+Array<double, 2> PyramidLevel::to_full_scale(View<const double, 2> xy_px) const {
+  Array<double, 2> out(xy_px.shape());
+  for (Index n = 0; n < xy_px.size(); ++n) {
+    for (Index axis = 0; axis < 2; ++axis)
+      out(n, axis) = (xy_px(n, axis) + 0.5) * static_cast<double>(scale) - 0.5;
+  }
+  return out;
+}
+
 Array<std::uint8_t, 3> block_means(View<const std::uint8_t, 3> image, Index scale, LightSteps light_steps,
                                    ValueOfSteps value_of_steps) {
   const Index height = image.size(0) / scale, width = image.size(1) / scale;

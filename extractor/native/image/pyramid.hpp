@@ -22,6 +22,8 @@ struct PyramidLevel {
 
   // Points (N, 2) px of the full image in this one.
   Array<double, 2> to_level(View<const double, 2> xy_px) const;
+  // Points (N, 2) px of this one in the full image.
+  Array<double, 2> to_full_scale(View<const double, 2> xy_px) const;
 
   CMP_RECORD("extractor.image.pyramid.PyramidLevel", image, scale, frame, response)
 };

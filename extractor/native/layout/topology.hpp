@@ -21,7 +21,7 @@ struct Topology {
   // (M, 18) the markers in the two rings around, the first ring first
   View<const std::int32_t, 2> ring_markers;
   View<const double, 3> ring_vectors;  // (M, 18, 2) from a marker to these, in units of the mean edge, y up
-  View<const double, 3> derivative_stencil;  // (M, 5, 18) weights that give the map's derivatives, else 0
+  View<const double, 3> derivative_stencil;  // (M, 18, 5) weights that give the map's derivatives, else 0
   View<const double, 2> edge_vectors;        // (E, 2) from an edge's start to its end, in the same unit
   // (E, 2) on the same gridline, the marker before an edge's start and the one after its end
   View<const std::int32_t, 2> next_markers;

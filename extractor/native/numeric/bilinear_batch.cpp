@@ -132,4 +132,22 @@ void fill_patch_means(View<const std::uint8_t, 1> flat, Index height, Index widt
   }
 }
 
+Array<double, 2> patch_means(View<const std::uint8_t, 3> image, View<const Patch, 1> patches) {
+  Array<double, 2> out({patches.size(), 4});
+  SampleBuffers buffers = allocate_sample_buffers();
+  const auto columns = buffers.patches.view();
+  for (Index first = 0; first < patches.size(); first += BATCH_POINTS) {
+    const Index count = std::min(BATCH_POINTS, patches.size() - first);
+    for (Index i = 0; i < count; ++i) {
+      const auto& [x, y, radius] = patches[first + i];
+      columns[X + i] = x, columns[Y + i] = y, columns[RADIUS + i] = radius;
+    }
+    fill_patch_means(image.flat(), image.size(0), image.size(1), count, buffers);
+    for (Index i = 0; i < count; ++i) {
+      for (Index k = 0; k < 4; ++k) out(first + i, k) = columns[COLOR + k * BATCH_POINTS + i];
+    }
+  }
+  return out;
+}
+
 }  // namespace cmp::numeric

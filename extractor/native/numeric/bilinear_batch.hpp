@@ -60,4 +60,12 @@ void fill_point_samples(View<const std::uint8_t, 1> flat, Index height, Index wi
 void fill_patch_means(View<const std::uint8_t, 1> flat, Index height, Index width, Index count,
                       SampleBuffers& buffers);
 
+// A patch of the image, px.
+struct Patch {
+  double x, y, radius;
+};
+
+// (N, 4) the means of fill_patch_mean, and 1 for patches in the image (H, W, 3), else 0.
+Array<double, 2> patch_means(View<const std::uint8_t, 3> image, View<const Patch, 1> patches);
+
 }  // namespace cmp::numeric

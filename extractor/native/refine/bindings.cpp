@@ -9,7 +9,10 @@ namespace cmp::refine {
 
 void add_refine(nb::module_ module) {
   bind<&first_estimate>(module, "first_estimate", {"view", "topology", "start", "places", "known", "rows"});
-  bind<&measure_image>(module, "measure_image", {"view", "topology", "first", "small_remainder", "stations"});
+  bind<&refined_markers>(module, "refined_markers", {"view", "topology", "first", "schedule", "stations"});
+  bind<&refined_again>(module, "refined_again",
+                       {"view", "topology", "places", "known", "schedule", "stations"});
+  module.attr("FOOT_DEVIATION") = ParallaxLimits{}.foot_deviation;
   bind<&extrapolate_pattern>(module, "extrapolate_pattern", {"xy", "topology"});
 }
 

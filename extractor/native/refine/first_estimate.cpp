@@ -43,6 +43,22 @@ numbering::InitialMarkers corrected_places(const StartPlaces& places, CorrectedO
 
 }  // namespace
 
+FirstEstimateArrays::operator FirstEstimate() const {
+  return {measured,
+          reliable,
+          bend,
+          information,
+          weight,
+          sigma,
+          noise,
+          pixel_noise,
+          dot_gain,
+          ink_shift,
+          levels_of(levels),
+          contrasts_of(contrasts),
+          {places.xy_px, places.edge_px, places.agreed, places.is_intact}};
+}
+
 FirstEstimateArrays first_estimate(const image::PyramidLevel& view, const layout::Topology& topology,
                                    View<const double, 2> start, const StartPlaces& places,
                                    const std::optional<KnownAppearance>& known, Index rows,

@@ -24,12 +24,22 @@ struct FirstEstimateLimits {
   OutlierLimits outliers;
 };
 
+// The parallax of cells above or below the black, of the previous image of a sequence.
+struct KnownParallax {
+  View<const double, 1> foot_px;
+  View<const double, 2> foot_cov_px2;
+  double rate, rate_deviation;
+
+  CMP_RECORD("extractor.refine.relief.Parallax", foot_px, foot_cov_px2, rate, rate_deviation)
+};
+
 // What the previous image of a sequence tells of this one; fields as in Appearance.
 struct KnownAppearance {
   double sigma, noise, pixel_noise;
   InkLevels levels;
+  std::optional<KnownParallax> parallax;
 
-  CMP_RECORD("extractor.refine.estimate.Appearance", sigma, noise, pixel_noise, levels)
+  CMP_RECORD("extractor.refine.estimate.Appearance", sigma, noise, pixel_noise, levels, parallax)
 };
 
 // The estimate after the round of profiles; the Python class explains the fields.
@@ -60,6 +70,7 @@ struct FirstEstimateArrays {
 
   CMP_RECORD("extractor.refine.estimate.FirstEstimate", measured, reliable, bend, information, weight, sigma,
              noise, pixel_noise, dot_gain, ink_shift, levels, contrasts, places)
+  operator FirstEstimate() const;
 };
 
 // The levels of the inks, the blur, and the round of profiles.

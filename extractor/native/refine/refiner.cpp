@@ -60,29 +60,57 @@ void update_to_full_scale(FinalMarkers& markers, const StartPlaces& places, doub
   }
 }
 
+// The parallax of cells of unknown height, a shift of mean 0; nothing where the cells' sizes do not change.
+//
+// A change of the sizes from one side of the image to the other shows a foot beside the middle.
+std::optional<Parallax> unknown_parallax(const UnevenDotGain& change, double width, double height,
+                                         const ParallaxLimits& limits) {
+  const double slope = std::hypot(change.outward, change.across);
+  if (slope == 0.0) return std::nullopt;
+  const double foot_px = limits.foot_deviation * width * change.across / slope;
+  Parallax out{Array<double, 1>({2}), Array<double, 2>({2, 2}, 0.0), 0.0, limits.unseen * slope};
+  out.foot_px[0] = 0.5 * (width - 1.0), out.foot_px[1] = 0.5 * (height - 1.0);
+  out.foot_cov_px2(0, 0) = out.foot_cov_px2(1, 1) = foot_px * foot_px;
+  return out;
+}
+
 }  // namespace
 
-MeasuredImage measure_image(const image::PyramidLevel& view, const layout::Topology& topology,
-                            const FirstEstimate& first, double small_remainder, Index stations,
-                            const RefinerLimits& limits) {
+RefinedMarkers refined_markers(const image::PyramidLevel& view, const layout::Topology& topology,
+                               const FirstEstimate& first, const Schedule& schedule, Index stations,
+                               const RefinerLimits& limits) {
   const auto scale = static_cast<double>(view.scale);
+  const double height = scale * static_cast<double>(view.image.size(0)),
+               width = scale * static_cast<double>(view.image.size(1));
   const numbering::InitialMarkers own =
       places_in_view(view, first, topology.cells, limits.steps.step.dot_gain);
   const StartPlaces places{own.xy_px, own.edge_px, own.agreed, own.is_intact};
-  Estimate after = synthesis_steps(view, topology, first, small_remainder, stations, limits.steps);
+  Estimate after = synthesis_steps(view, topology, first, schedule.small_remainder, stations, limits.steps);
   FinalMarkers markers = accepted_or_recovered(view, topology, first, after, places, limits);
   update_to_full_scale(markers, places, scale, limits.agreed_deviation);
   for (bool& explained : markers.unaccepted) explained = !explained;
   return {std::move(markers.xy_px),
           std::move(markers.cov_px2),
           std::move(markers.unaccepted),
+          scale * after.sigma,
+          scale * after.noise,
+          {view.scale, after.sigma, after.noise, std::move(after.levels), first.pixel_noise,
+           unknown_parallax(after.uneven_dot_gain, width, height, limits.parallax)},
           std::move(after.reading),
-          after.sigma,
-          after.noise,
-          first.pixel_noise,
-          std::move(after.levels),
-          after.uneven_dot_gain,
-          after.drawn.scatter};
+          {scale * scale * after.drawn.scatter.variance_px2, after.drawn.scatter.share}};
+}
+
+RefinedMarkers refined_again(const image::PyramidLevel& view, const layout::Topology& topology,
+                             const StartPlaces& places, const KnownAppearance& known,
+                             const Schedule& schedule, Index stations, const RefinerLimits& limits) {
+  const FirstEstimateArrays first =
+      first_estimate(view, topology, places.xy_px, places, known, schedule.max_profile_rows, limits.first);
+  RefinedMarkers out = refined_markers(view, topology, first, schedule, stations, limits);
+  if (known.parallax) {
+    const auto& [foot, cov, rate, deviation] = *known.parallax;
+    out.appearance.parallax = Parallax{Array<double, 1>(foot), Array<double, 2>(cov), rate, deviation};
+  }
+  return out;
 }
 
 }  // namespace cmp::refine

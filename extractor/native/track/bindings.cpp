@@ -7,8 +7,7 @@
 namespace cmp::track {
 
 void add_track(nb::module_ module) {
-  bind<&seen_cells>(module, "seen_cells", {"view", "reduced", "xy_px", "tables"});
-  bind<&resting_shifts>(module, "resting_shifts", {"view", "xy_px", "tables", "levels"});
+  bind<&seen_cells>(module, "seen_cells", {"view", "xy_px", "tables"});
   bind<&warm_start>(module, "warm_start", {"view", "state", "tables"});
 }
 

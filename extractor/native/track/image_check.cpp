@@ -4,7 +4,7 @@
 #include <limits>
 #include <optional>
 
-#include "numeric/bilinear.hpp"
+#include "numeric/bilinear_batch.hpp"
 #include "numeric/dense_systems.hpp"
 
 namespace cmp::track {
@@ -19,24 +19,26 @@ struct SampledImage {
   Index height, width;
 };
 
-// A predicted cell: its corners (3, 2), what lies across its edges (3,), its middle, and the radius of
-// samples, px.
+constexpr Index CELL_PATCHES = 4;  // the middle of a cell, and across its edges
+
+// A predicted cell: its corners (3, 2), what lies across its edges (3,), its middle, px, and the colors in
+// its middle and across its edges (4, 4), as patch_means gives them.
 struct PredictedCell {
   View<const double, 2> xy;
   View<const std::uint8_t, 1> across_edge;
-  double x, y, radius;
+  double x, y;
+  View<const double, 2> colors;
+
+  View<const double, 1> across(int k) const { return colors[1 + k]; }
 };
 
 // The colors of a cell and around it.
 struct CellColors {
-  std::array<double, 3> middle, black;  // black: the sum over the edges to black cells
-  std::array<double, 9> across;         // (3, 3) the color across each edge
-  std::array<double, 3> own;            // the ink level over black
+  std::array<double, 3> black;  // the sum over the edges to black cells
+  std::array<double, 3> own;    // the ink level over black
   Index black_count;
 
-  View<double, 1> middle_view() { return {middle.data(), {3}}; }
   View<const double, 1> black_view() const { return {black.data(), {3}}; }
-  View<double, 1> across_view(int k) { return {across.data() + 3 * k, {3}}; }
   View<const double, 1> own_view() const { return {own.data(), {3}}; }
 };
 
@@ -45,28 +47,36 @@ struct WhiteEdges {
   std::int64_t white = 0, missing = 0, elsewhere = 0;
 };
 
-PredictedCell predicted_cell(View<const double, 2> xy, View<const std::uint8_t, 1> across_edge,
-                             double level_radius) {
-  const double x = (xy(0, 0) + xy(1, 0) + xy(2, 0)) / 3, y = (xy(0, 1) + xy(1, 1) + xy(2, 1)) / 3;
-  return {xy, across_edge, x, y, level_radius * std::hypot(xy(0, 0) - x, xy(0, 1) - y)};
+// The middles of the cells with the corners xy (C, 3, 2), and the places mirrored at their edges.
+Array<numeric::Patch, 1> cell_patches(View<const double, 3> xy, double level_radius) {
+  Array<numeric::Patch, 1> out({CELL_PATCHES * xy.size()});
+  for (Index i = 0; i < xy.size(); ++i) {
+    const auto own = xy[i];
+    const double x = (own(0, 0) + own(1, 0) + own(2, 0)) / 3, y = (own(0, 1) + own(1, 1) + own(2, 1)) / 3;
+    const double radius = level_radius * std::hypot(own(0, 0) - x, own(0, 1) - y);
+    out[CELL_PATCHES * i] = {x, y, radius};
+    for (Index k = 0; k < 3; ++k) {
+      const Index next = (k + 1) % 3;
+      out[CELL_PATCHES * i + 1 + k] = {own(k, 0) + own(next, 0) - x, own(k, 1) + own(next, 1) - y, radius};
+    }
+  }
+  return out;
 }
 
-// Samples the colors across the cell's edges, and counts white ones.
+// Adds the colors across the cell's edges, and counts white ones.
 //
-// Returns whether no black cell is as bright as white; nothing if a sample lies outside the image.
-std::optional<bool> sample_across_edges(const SampledImage& image, const PredictedCell& cell,
-                                        double min_white_ratio, CellColors& colors, WhiteEdges& edges) {
-  const double brightness = colors.middle[0] + colors.middle[1] + colors.middle[2];
+// Returns whether no black cell is as bright as white; nothing if a place lies outside the image.
+std::optional<bool> look_across_edges(const PredictedCell& cell, double min_white_ratio, CellColors& colors,
+                                      WhiteEdges& edges) {
+  const auto middle = cell.colors[0];
+  const double brightness = middle[0] + middle[1] + middle[2];
   bool confirmed = true, outside = false;
   colors.black = {};
   colors.black_count = 0;
   for (int k = 0; k < 3; ++k) {
     if (cell.across_edge[k] == NO_CELL) continue;
-    const int next = (k + 1) % 3;
-    const double mx = cell.xy(k, 0) + cell.xy(next, 0) - cell.x,
-                 my = cell.xy(k, 1) + cell.xy(next, 1) - cell.y;
-    const auto color = colors.across_view(k);
-    if (!numeric::fill_patch_mean(image.flat, image.height, image.width, mx, my, cell.radius, color)) {
+    const auto color = cell.across(k);
+    if (color[3] == 0.0) {
       outside = true;
       continue;
     }
@@ -86,7 +96,7 @@ std::optional<bool> sample_across_edges(const SampledImage& image, const Predict
 }
 
 // Whether the ink is as strong towards the corners as in the middle, and weak across edges to black cells.
-bool has_ink_inside_only(const SampledImage& image, const PredictedCell& cell, CellColors& colors,
+bool has_ink_inside_only(const SampledImage& image, const PredictedCell& cell, const CellColors& colors,
                          const CheckLimits& limits) {
   const auto own = colors.own_view();
   const double limit = limits.min_inner_strength * dot3(own, own);
@@ -98,7 +108,7 @@ bool has_ink_inside_only(const SampledImage& image, const PredictedCell& cell, C
     const double inner =
         numeric::weighted_sample(image.flat, image.height, image.width, px, py, own[0], own[1], own[2]);
     if (!(inner - zero > limit)) return false;
-    if (cell.across_edge[k] == BLACK_CELL && !(dot3(colors.across_view(k), own) - zero < limit)) return false;
+    if (cell.across_edge[k] == BLACK_CELL && !(dot3(cell.across(k), own) - zero < limit)) return false;
   }
   return true;
 }
@@ -132,18 +142,20 @@ CellCheck check_cells(View<const std::uint8_t, 3> image, View<const double, 3> x
   const Index count = xy.size();
   Array<std::uint8_t, 1> verdict({count}, UNSEEN);
   Array<double, 3> levels({2, count, 3}, std::numeric_limits<double>::quiet_NaN());
+  const Array<numeric::Patch, 1> patches = cell_patches(xy, limits.level_radius);
+  const Array<double, 2> means = numeric::patch_means(image, patches);
   CellColors colors{};
   WhiteEdges edges;
   for (Index i = 0; i < count; ++i) {
-    const auto cell = predicted_cell(xy[i], tables.across_edge[i], limits.level_radius);
-    if (!numeric::fill_patch_mean(sampled.flat, sampled.height, sampled.width, cell.x, cell.y, cell.radius,
-                                  colors.middle_view()))
-      continue;
-    const auto no_rival = sample_across_edges(sampled, cell, limits.min_white_ratio, colors, edges);
+    const auto [x, y, _] = patches[CELL_PATCHES * i];
+    const auto own = means.view().slice(CELL_PATCHES * i, CELL_PATCHES * (i + 1));
+    const PredictedCell cell{xy[i], tables.across_edge[i], x, y, own};
+    if (own(0, 3) == 0.0) continue;
+    const auto no_rival = look_across_edges(cell, limits.min_white_ratio, colors, edges);
     if (!no_rival) continue;
     for (int channel = 0; channel < 3; ++channel) {
       const double black = colors.black[channel] / static_cast<double>(colors.black_count);
-      colors.own[channel] = colors.middle[channel] - black;
+      colors.own[channel] = own(0, channel) - black;
       levels(0, i, channel) = colors.own[channel];
       levels(1, i, channel) = black;
     }

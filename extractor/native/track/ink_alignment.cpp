@@ -50,8 +50,8 @@ SearchWindow search_window(View<const double, 2> xy, View<const std::int32_t, 1>
   const double ux = b[0] - a[0], uy = b[1] - a[1];
   const double vx = (c[0] - a[0] - 0.5 * ux) / TRIANGLE_HEIGHT,
                vy = (c[1] - a[1] - 0.5 * uy) / TRIANGLE_HEIGHT;
-  return {(a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3, ux * vy - uy * vx, uy * uy + vy * vy,
-          ux * uy + vx * vy};
+  const auto [x, y] = cell_middle(xy, corners);
+  return {x, y, ux * vy - uy * vx, uy * uy + vy * vy, ux * uy + vx * vy};
 }
 
 // The moments of the ink in rows of pixels, and the distance of the rows, px.
@@ -129,11 +129,16 @@ double add_shifts(View<const double, 2> xy, View<double, 2> shift, View<const st
 
 }  // namespace
 
-Array<double, 2> measure_shifts(View<const std::uint8_t, 3> image, View<const double, 2> xy,
-                                const WarmTables& tables, View<const double, 3> levels,
-                                const AlignmentLimits& limits) {
+std::array<double, 2> cell_middle(View<const double, 2> xy, View<const std::int32_t, 1> corners) {
+  const auto a = xy[corners[0]], b = xy[corners[1]], c = xy[corners[2]];
+  return {(a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3};
+}
+
+Array<double, 2> ink_centroids(View<const std::uint8_t, 3> image, View<const double, 2> xy,
+                               const WarmTables& tables, View<const double, 3> levels,
+                               const AlignmentLimits& limits) {
   const auto corners = tables.corners, nearest = tables.nearest;
-  Array<double, 2> shift({corners.size(), 2}, NOT_A_NUMBER);
+  Array<double, 2> centroid({corners.size(), 2}, NOT_A_NUMBER);
   const auto ink_levels = levels[0], black_levels = levels[1];
   InkWeights ink{{}, 0.0, limits.min_pixel_ink};
   const View<const double, 1> weights(ink.weights.data(), {3});
@@ -148,11 +153,11 @@ Array<double, 2> measure_shifts(View<const std::uint8_t, 3> image, View<const do
     const auto [sums, row_step] = window_moments(image, window, ink, limits);
     const double least = limits.min_ink_share * CELL_AREA_RATIO * std::abs(window.area);
     if (static_cast<double>(row_step) * sums.area > least) {
-      shift(i, 0) = sums.x / sums.area;
-      shift(i, 1) = sums.y / sums.area;
+      centroid(i, 0) = window.x + sums.x / sums.area;
+      centroid(i, 1) = window.y + sums.y / sums.area;
     }
   }
-  return shift;
+  return centroid;
 }
 
 AlignedMarkers update_shifts_and_move_markers(View<const double, 2> xy, View<double, 2> shift,

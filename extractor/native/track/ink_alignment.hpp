@@ -1,7 +1,7 @@
 // The alignment of predicted cells to the image: every cell moves to the centroid of its ink nearby.
 #pragma once
 
-#include <tuple>
+#include <array>
 
 #include "base/array.hpp"
 #include "track/warm_tables.hpp"
@@ -31,16 +31,19 @@ struct AlignedMarkers {
   Array<double, 1> edge_px;  // (M,) px, the mean edges of the cells at each marker
 };
 
-// (C, 2) px from each cell's predicted middle to the centroid of its ink nearby, NaN where there is too
-// little ink.
+// The middle of a cell with these corners (3,); xy (M, 2) markers.
+std::array<double, 2> cell_middle(View<const double, 2> xy, View<const std::int32_t, 1> corners);
+
+// (C, 2) px, the centroid of each cell's ink near the cell's predicted middle, NaN where there is too little
+// ink.
 //
 // The ink is unmixed from the two others, whose cells touch this cell's corners, and from white, which shows
 // all three. The window is the ellipse that a disc in an equilateral cell becomes when the cell is sheared to
 // its corners. image (H, W, 3) BGR; xy (M, 2) markers, NaN where not predicted; levels (2, C, 3) of
 // CellCheck.
-Array<double, 2> measure_shifts(View<const std::uint8_t, 3> image, View<const double, 2> xy,
-                                const WarmTables& tables, View<const double, 3> levels,
-                                const AlignmentLimits& limits);
+Array<double, 2> ink_centroids(View<const std::uint8_t, 3> image, View<const double, 2> xy,
+                               const WarmTables& tables, View<const double, 3> levels,
+                               const AlignmentLimits& limits);
 
 // The markers xy (M, 2) after the mean shift of their cells; too large shifts (C, 2) become NaN.
 //

@@ -21,8 +21,8 @@ std::uint32_t pixel_word(View<const std::uint8_t, 1> pixel) {
   return blue | green << 8 | red << 16;
 }
 
-double byte_of(std::uint32_t word, int number) {
-  return static_cast<double>(static_cast<std::int32_t>(word >> (8 * number)) & 255);
+float byte_of(std::uint32_t word, int number) {
+  return static_cast<float>(static_cast<std::int32_t>(word >> (8 * number)) & 255);
 }
 
 }  // namespace
@@ -46,22 +46,26 @@ Index append_pixels(View<const std::uint8_t, 1> flat, Index width, Index y, Inde
 }
 
 void add_ink_moments(const PixelBlock& block, double x, double y, const InkWeights& ink, InkMoments& sums) {
-  const double w0 = ink.weights[0], w1 = ink.weights[1], w2 = ink.weights[2], zero = ink.zero,
-               least = ink.least;
-  double total = 0.0, moment_x = 0.0, moment_y = 0.0;
+  const auto w0 = static_cast<float>(ink.weights[0]), w1 = static_cast<float>(ink.weights[1]),
+             w2 = static_cast<float>(ink.weights[2]);
+  const auto zero = static_cast<float>(ink.zero), least = static_cast<float>(ink.least);
+  // from a whole pixel on, as small numbers are differences of large ones
+  const auto x0 = static_cast<std::int32_t>(x), y0 = static_cast<std::int32_t>(y);
+  const auto from_x = static_cast<float>(x - x0), from_y = static_cast<float>(y - y0);
+  float total = 0.0F, moment_x = 0.0F, moment_y = 0.0F;
   const View<const std::uint32_t, 1> color(block.color.data(), {BLOCK_PIXELS});
   const View<const std::int32_t, 1> xs(block.x.data(), {BLOCK_PIXELS}), ys(block.y.data(), {BLOCK_PIXELS});
   for (Index k = 0; k < block.count; ++k) {
     const std::uint32_t word = color[k];
-    double share = w0 * byte_of(word, 0) + w1 * byte_of(word, 1) + w2 * byte_of(word, 2) - zero;
-    share = std::min(share, 1.0) * static_cast<double>(share > least);
+    float share = w0 * byte_of(word, 0) + w1 * byte_of(word, 1) + w2 * byte_of(word, 2) - zero;
+    share = std::min(share, 1.0F) * static_cast<float>(share > least);
     total += share;
-    moment_x += share * (static_cast<double>(xs[k]) - x);
-    moment_y += share * (static_cast<double>(ys[k]) - y);
+    moment_x += share * (static_cast<float>(xs[k] - x0) - from_x);
+    moment_y += share * (static_cast<float>(ys[k] - y0) - from_y);
   }
-  sums.area += total;
-  sums.x += moment_x;
-  sums.y += moment_y;
+  sums.area += static_cast<double>(total);
+  sums.x += static_cast<double>(moment_x);
+  sums.y += static_cast<double>(moment_y);
 }
 
 }  // namespace cmp::track

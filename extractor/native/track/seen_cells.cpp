@@ -48,23 +48,16 @@ Array<double, 2> mean_light(View<const double, 3> levels, View<const float, 1> l
   return out;
 }
 
-Array<double, 2> resting_shifts(const image::PyramidLevel& view, View<const double, 2> xy_px,
-                                const WarmTables& tables, View<const double, 3> levels,
-                                const AlignmentLimits& limits) {
-  Array<double, 2> shift = measure_shifts(view.image, view.to_level(xy_px), tables, levels, limits);
-  for (double& value : shift) value = std::isfinite(value) ? value : 0.0;
-  return shift;
-}
-
-SeenCellsArrays seen_cells(const image::PyramidLevel& view, const image::PyramidLevel& reduced,
-                           View<const double, 2> xy_px, const WarmTables& tables, const CellLimits& limits) {
+SeenCellsArrays seen_cells(const image::PyramidLevel& view, View<const double, 2> xy_px,
+                           const WarmTables& tables, const CellLimits& limits) {
   const Array<double, 2> none({tables.corners.size(), 3}, 0.0);
-  const Array<double, 3> corners = corners_at(xy_px, tables.corners);
+  const Array<double, 2> xy = view.to_level(xy_px);
+  const Array<double, 3> corners = corners_at(xy, tables.corners);
   auto levels = check_cells(view.image, corners, tables, none, false, limits.check).cell_levels;
   for (const std::uint8_t ink : {1, 2, 3}) fill_unseen(levels, tables.ink, ink);
-  Array<double, 2> shift = resting_shifts(reduced, xy_px, tables, levels, limits.alignment);
+  const Array<double, 2> ink = ink_centroids(view.image, xy, tables, levels, limits.alignment);
   Array<double, 2> light = mean_light(levels, view.response.light);
-  return {std::move(levels), std::move(light), std::move(shift)};
+  return {std::move(levels), std::move(light), view.to_full_scale(ink)};
 }
 
 }  // namespace cmp::track

@@ -17,36 +17,28 @@ struct CellLimits {
 
 // What a frame shows of its C cells; the Python class explains the fields.
 struct SeenCells {
-  View<const double, 3> levels;    // (2, C, 3)
-  View<const double, 2> light;     // (2, 3)
-  View<const double, 2> shift_px;  // (C, 2)
+  View<const double, 3> levels;  // (2, C, 3)
+  View<const double, 2> light;   // (2, 3)
+  View<const double, 2> ink_px;  // (C, 2)
 
-  CMP_RECORD("extractor.track.warm_start.SeenCells", levels, light, shift_px)
+  CMP_RECORD("extractor.track.warm_start.SeenCells", levels, light, ink_px)
 };
 
 // The same, with memory of its own.
 struct SeenCellsArrays {
   Array<double, 3> levels;
-  Array<double, 2> light, shift_px;
+  Array<double, 2> light, ink_px;
 
-  CMP_RECORD("extractor.track.warm_start.SeenCells", levels, light, shift_px)
+  CMP_RECORD("extractor.track.warm_start.SeenCells", levels, light, ink_px)
 };
 
 // (2, 3) the mean light of cells over black, and of their black, from levels (2, C, 3) of 0 to 255; light
 // (256,) of the values, which is a straight line between two values.
 Array<double, 2> mean_light(View<const double, 3> levels, View<const float, 1> light);
 
-// (C, 2) px, the shifts of cells whose markers xy_px (M, 2), in the full image, are known; 0 where they are
-// not. levels (2, C, 3), with which the next frame is aligned.
-Array<double, 2> resting_shifts(const image::PyramidLevel& view, View<const double, 2> xy_px,
-                                const WarmTables& tables, View<const double, 3> levels,
-                                const AlignmentLimits& limits);
-
 // What an image shows of the cells of numbered markers xy_px (M, 2). Cells that are not seen have the mean
-// levels of their ink.
-//
-// view, the full image; reduced, the same at the scale of the next check.
-SeenCellsArrays seen_cells(const image::PyramidLevel& view, const image::PyramidLevel& reduced,
-                           View<const double, 2> xy_px, const WarmTables& tables, const CellLimits& limits);
+// levels of their ink. view is the image at the scale of the next check.
+SeenCellsArrays seen_cells(const image::PyramidLevel& view, View<const double, 2> xy_px,
+                           const WarmTables& tables, const CellLimits& limits);
 
 }  // namespace cmp::track

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "numbering/marker_places.hpp"
-#include "numeric/bilinear.hpp"
+#include "numeric/bilinear_batch.hpp"
 #include "track/image_check.hpp"
 
 namespace cmp::track {
@@ -13,7 +13,7 @@ namespace cmp::track {
 namespace {
 
 // Whether the color (3,) of the middle of cell i matches its own ink better than the two others.
-bool has_own_ink(const std::array<double, 3>& color, Index i, const WarmTables& tables,
+bool has_own_ink(View<const double, 1> color, Index i, const WarmTables& tables,
                  View<const double, 2> levels, double min_strength) {
   const auto norm = [](View<const double, 1> v) {
     return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -42,19 +42,17 @@ struct VisibleCells {
 VisibleCells count_matching_centres(View<const std::uint8_t, 3> image, View<const double, 2> xy,
                                     const WarmTables& tables, View<const double, 2> levels,
                                     const WarmStartLimits& limits) {
-  const auto flat = image.flat();
-  const Index height = image.size(0), width = image.size(1);
-  std::array<double, 3> color{};
-  const View<double, 1> color_view(color.data(), {3});
+  Array<numeric::Patch, 1> patches({tables.corners.size()});
+  for (Index i = 0; i < patches.size(); ++i) {
+    const auto [x, y] = cell_middle(xy, tables.corners[i]);
+    patches[i] = {x, y, limits.centre_radius_px};
+  }
+  const Array<double, 2> colors = numeric::patch_means(image, patches);
   std::int64_t visible = 0, matching = 0;
-  for (Index i = 0; i < tables.corners.size(); ++i) {
-    const auto corners = tables.corners[i];
-    const auto a = xy[corners[0]], b = xy[corners[1]], c = xy[corners[2]];
-    const double x = (a[0] + b[0] + c[0]) / 3, y = (a[1] + b[1] + c[1]) / 3;
-    // outside the image, or NaN
-    if (!numeric::fill_patch_mean(flat, height, width, x, y, limits.centre_radius_px, color_view)) continue;
+  for (Index i = 0; i < colors.size(); ++i) {
+    if (colors(i, 3) == 0.0) continue;  // outside the image, or NaN
     ++visible;
-    matching += has_own_ink(color, i, tables, levels, limits.min_centre_strength);
+    matching += has_own_ink(colors[i], i, tables, levels, limits.min_centre_strength);
   }
   return {visible, matching};
 }
@@ -152,28 +150,57 @@ std::optional<Array<double, 2>> best_prediction(const image::PyramidLevel& view,
   return best;
 }
 
+// Markers moved to their cells' inks, and the centroids (C, 2) of these, px in the view.
+struct FoundInks {
+  AlignedMarkers aligned;
+  Array<double, 2> centroid;
+};
+
 // The markers (M, 2) moved to the places of their cells' inks, in at most two passes.
 //
 // Blur, encoding and the choice of pixels shift centroids by a tenth of a pixel, equally in equal frames.
-// Therefore the shift of a cell that rests is the difference from the shift in the previous frame at its own
-// markers.
-AlignedMarkers align_to_inks(View<const std::uint8_t, 3> image, const Array<double, 2>& predicted,
-                             const SeenCells& before, const WarmTables& tables,
-                             const WarmStartLimits& limits) {
-  AlignedMarkers aligned{Array<double, 2>(predicted.view()), 0.0, {}};
+// Therefore a cell that rests has moved from the markers of the previous frame as its centroid has moved.
+FoundInks align_to_inks(const image::PyramidLevel& view, Array<double, 2> predicted, const TrackState& state,
+                        const WarmTables& tables, const WarmStartLimits& limits) {
+  const auto& before = state.cells;
+  const auto corners = tables.corners;
+  const Array<double, 2> last = view.to_level(state.xy_px), last_ink = view.to_level(before.ink_px);
+  FoundInks found{{std::move(predicted), 0.0, {}}, {}};
   for (int pass = 0; pass < 2; ++pass) {
-    const Array<double, 2> at = std::move(aligned.xy_px);
-    Array<double, 2> shift = measure_shifts(image, at, tables, before.levels, limits.cells.alignment);
+    const Array<double, 2> at = std::move(found.aligned.xy_px);
+    found.centroid = ink_centroids(view.image, at, tables, before.levels, limits.cells.alignment);
+    Array<double, 2> shift(found.centroid.view());
     for (Index i = 0; i < shift.size(); ++i) {
-      const auto start = at[tables.corners(i, 0)], end = at[tables.corners(i, 1)];
+      const auto middle = cell_middle(at, corners[i]), last_middle = cell_middle(last, corners[i]);
+      const auto start = at[corners(i, 0)], end = at[corners(i, 1)];
       const double edge = limits.resting_shift * std::hypot(end[0] - start[0], end[1] - start[1]);
-      const double x = shift(i, 0) - before.shift_px(i, 0), y = shift(i, 1) - before.shift_px(i, 1);
+      for (Index axis = 0; axis < 2; ++axis) shift(i, axis) -= middle[axis];
+      const double x = shift(i, 0) - (last_ink(i, 0) - last_middle[0]);
+      const double y = shift(i, 1) - (last_ink(i, 1) - last_middle[1]);
       if (std::hypot(x, y) < edge) shift(i, 0) = x, shift(i, 1) = y;
     }
-    aligned = update_shifts_and_move_markers(at, shift, tables.corners, limits.cells.alignment);
-    if (aligned.max_shift < limits.large_shift) break;
+    found.aligned = update_shifts_and_move_markers(at, shift, corners, limits.cells.alignment);
+    if (found.aligned.max_shift < limits.large_shift) break;
   }
-  return aligned;
+  return found;
+}
+
+// The inks' levels in another light: before and now (2, 3), mean light of some cells over black, and of their
+// black, in the previous and in the present image.
+refine::LevelArrays levels_in_light(const refine::InkLevels& levels, View<const double, 2> before,
+                                    View<const double, 2> now) {
+  constexpr double TINY = 1e-9;  // keeps a division finite
+  refine::LevelArrays out{Array<double, 2>(levels.cell), Array<double, 3>(levels.slope),
+                          Array<double, 2>(levels.black), Array<bool, 1>(levels.is_outlier)};
+  for (Index channel = 0; channel < 3; ++channel) {
+    const double gain = now(0, channel) / std::max(before(0, channel), TINY);
+    out.black(channel, 0) += now(1, channel) - before(1, channel);
+    for (Index i = 0; i < out.cell.size(); ++i) {
+      out.cell(i, channel) *= gain;
+      for (Index axis = 0; axis < 2; ++axis) out.slope(i, channel, axis) *= gain;
+    }
+  }
+  return out;
 }
 
 // Whether the white cell is where the layout has it, and nowhere else; where it is hidden, whether the whole
@@ -194,8 +221,8 @@ std::optional<WarmStart> warm_start(const image::PyramidLevel& view, const Track
                                     const WarmTables& tables, const WarmStartLimits& limits) {
   const auto predicted = best_prediction(view, state, tables, limits);
   if (!predicted) return std::nullopt;
-  const AlignedMarkers aligned =
-      align_to_inks(view.image, predict_missing(tables, *predicted), state.cells, tables, limits);
+  const auto [aligned, centroid] =
+      align_to_inks(view, predict_missing(tables, *predicted), state, tables, limits);
   const Array<double, 3> corners = corners_at(aligned.xy_px, tables.corners);
   CellCheck check = check_cells(view.image, corners, tables, state.cells.levels[0], true, limits.cells.check);
   if (!is_white_right(check, tables.is_rim, limits)) return std::nullopt;
@@ -209,8 +236,11 @@ std::optional<WarmStart> warm_start(const image::PyramidLevel& view, const Track
     }
   }
   Array<double, 2> light = mean_light(check.cell_levels, view.response.light);
-  return WarmStart{verified_markers(view, aligned, proved, tables.corners), std::move(check.cell_levels),
-                   std::move(light), by_rim};
+  auto ink_levels = levels_in_light(state.appearance.levels, state.cells.light, light);
+  return WarmStart{verified_markers(view, aligned, proved, tables.corners),
+                   {std::move(check.cell_levels), std::move(light), view.to_full_scale(centroid)},
+                   std::move(ink_levels),
+                   by_rim};
 }
 
 }  // namespace cmp::track

@@ -14,6 +14,7 @@
 #include "base/array.hpp"
 #include "image/pyramid.hpp"
 #include "numbering/marker_places.hpp"
+#include "refine/first_estimate.hpp"
 #include "track/seen_cells.hpp"
 #include "track/warm_tables.hpp"
 
@@ -42,18 +43,19 @@ struct TrackState {
   View<const bool, 1> known;    // (M,)
   std::optional<View<const double, 2>> previous_px;
   SeenCells cells;
+  refine::KnownAppearance appearance;
 
-  CMP_RECORD("extractor.track.warm_start.TrackState", xy_px, known, previous_px, cells)
+  CMP_RECORD("extractor.track.warm_start.TrackState", xy_px, known, previous_px, cells, appearance)
 };
 
 // A proved start; the Python class explains the fields.
 struct WarmStart {
   numbering::InitialMarkers places;
-  Array<double, 3> levels;
-  Array<double, 2> light;
+  SeenCellsArrays cells;
+  refine::LevelArrays ink_levels;
   bool by_rim;
 
-  CMP_RECORD("extractor.track.warm_start.WarmStart", places, levels, light, by_rim)
+  CMP_RECORD("extractor.track.warm_start.WarmStart", places, cells, ink_levels, by_rim)
 };
 
 // The start from the last frame, in an image at the scale of the check; nothing where it does not prove one.

@@ -36,10 +36,6 @@ class MarkerScatter(NamedTuple):
     variance_px2: float
     share: float
 
-    def at_scale(self, scale: float) -> MarkerScatter:
-        """The scatter in an image that is larger by the factor ``scale``."""
-        return self._replace(variance_px2=scale**2 * self.variance_px2)
-
 
 NO_SCATTER = MarkerScatter(0.0, 0.0)
 

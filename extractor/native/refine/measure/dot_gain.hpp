@@ -38,8 +38,6 @@ double measure_dot_gain(View<const double, 2> sums, const ShiftGradients& gradie
 struct UnevenDotGain {
   double outward = 0.0;  // with the distance from the image's middle
   double across = 0.0;   // from one side of the image to the other
-
-  CMP_RECORD("extractor.refine.estimate.UnevenDotGain", outward, across)
 };
 
 // The changes of the dot gain, by a cone and a plane through the shifts of gridlines inside the pattern.

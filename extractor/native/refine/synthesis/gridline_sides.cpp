@@ -13,6 +13,8 @@ struct Point {
   double x, y;
 };
 
+using Channels = std::array<double, 4>;  // three of them, and a 0 that fills up a vector
+
 // The middle of the chord of a gridline (8,), px.
 Point chord_middle(View<const double, 1> line) {
   const double half = 0.5 * line[LENGTH];
@@ -60,12 +62,12 @@ Array<double, 2> GridlineSides::light(const InkLevels& levels) const {
   const auto cell = levels.cell;
   const auto slope = levels.slope;
   const auto black = levels.black;
-  std::array<std::array<double, 3>, POLYNOMIAL_TERMS> factors;
-  for (Index k = 0; k < POLYNOMIAL_TERMS; ++k) factors[k] = {black(0, k), black(1, k), black(2, k)};
+  std::array<Channels, POLYNOMIAL_TERMS> factors;
+  for (Index k = 0; k < POLYNOMIAL_TERMS; ++k) factors[k] = {black(0, k), black(1, k), black(2, k), 0.0};
   for (const KnownGridline& line : known_) {
-    std::array<double, 3> level{};
+    Channels level{};
     for (std::size_t k = 0; k < factors.size(); ++k) {
-      for (std::size_t channel = 0; channel < 3; ++channel)
+      for (std::size_t channel = 0; channel < level.size(); ++channel)
         level[channel] += line.terms[k] * factors[k][channel];
     }
     const auto own = out[line.edge];

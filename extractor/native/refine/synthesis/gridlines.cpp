@@ -12,18 +12,18 @@ namespace {
 constexpr Index DERIVATIVES = 5;
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-// Writes the map (2, 5) at marker m; NaN where a neighbour is unknown. near (K,), stencil (5, K).
+// Writes the map (2, 5) at marker m; NaN where a neighbour is unknown. near (K,), stencil (K, 5).
 void fill_derivatives(View<const double, 2> xy, Index m, View<const std::int32_t, 1> near,
                       View<const double, 2> stencil, View<double, 2> out) {
   std::array<double, DERIVATIVES> to_x{}, to_y{};
+  const double x = xy(m, 0), y = xy(m, 1);
   for (Index k = 0; k < near.size(); ++k) {
     const Index n = near[k];
     if (n < 0) continue;
-    const double dx = xy(n, 0) - xy(m, 0), dy = xy(n, 1) - xy(m, 1);
-    for (Index d = 0; d < DERIVATIVES; ++d) {
-      to_x[d] += stencil(d, k) * dx;
-      to_y[d] += stencil(d, k) * dy;
-    }
+    const double dx = xy(n, 0) - x, dy = xy(n, 1) - y;
+    const double* const weight = &stencil(k, 0);
+    for (Index d = 0; d < DERIVATIVES; ++d) to_x[d] += weight[d] * dx;
+    for (Index d = 0; d < DERIVATIVES; ++d) to_y[d] += weight[d] * dy;
   }
   for (Index d = 0; d < DERIVATIVES; ++d) {
     out(0, d) = to_x[d];
@@ -108,7 +108,7 @@ Array<double, 3> local_maps_at(View<const double, 2> xy, View<const bool, 1> whi
   const auto out = maps.view();
   for (Index m = 0; m < xy.size(); ++m) {
     if (!which[m]) continue;
-    const bool has_stencil = stencil(m, 0, 0) != 0.0 || stencil(m, 0, 1) != 0.0;
+    const bool has_stencil = stencil(m, 0, 0) != 0.0 || stencil(m, 1, 0) != 0.0;
     if (has_stencil) fill_derivatives(xy, m, near[m], stencil[m], out[m]);
     if (!std::isfinite(out(m, 0, 0))) {
       out[m].fill(NOT_A_NUMBER);

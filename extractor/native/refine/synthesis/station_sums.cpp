@@ -8,7 +8,7 @@ namespace cmp::refine {
 
 namespace {
 
-// Fills in the station that each pixel belongs to.
+// Fills in the station that each pixel belongs to, and weighs what the pixel tells.
 void fill_station_columns(const RowBlock& block, const PixelGeometry& geometry, float intervals,
                           GridlinePixels& pixels) {
   const PixelGeometry line = geometry;
@@ -19,7 +19,11 @@ void fill_station_columns(const RowBlock& block, const PixelGeometry& geometry, 
 #pragma omp simd
       for (Index i = first; i < first + PIXEL_LANES; ++i) {
         const float t = (pixels.rows.along[i] + step * line.along_step) * line.inverse_length;
-        pixels.station[j * lanes + i] = std::floor(t * intervals - 0.5F);
+        const Index at = j * lanes + i;
+        const float weight = pixels.weights.to_a[at] + pixels.weights.to_b[at];
+        pixels.station[at] = std::floor(t * intervals - 0.5F);
+        pixels.residuals.projection[at] *= weight;
+        pixels.residuals.information[at] *= weight * weight;
       }
     }
   }
@@ -37,10 +41,9 @@ void accumulate_station_sums(const RowBlock& block, const PixelGeometry& line, G
     const auto station = static_cast<float>(j);
     float residual = 0.0F, information = 0.0F;
     for (Index k = 0; k < count; ++k) {
-      const float own = pixels.weights.to_a[k] + pixels.weights.to_b[k];
-      const float g = pixels.station[k] == station ? own : 0.0F;
-      residual += g * pixels.residuals.projection[k];
-      information += g * g * pixels.residuals.information[k];
+      const bool is_own = pixels.station[k] == station;
+      residual += is_own ? pixels.residuals.projection[k] : 0.0F;
+      information += is_own ? pixels.residuals.information[k] : 0.0F;
     }
     sums(j, STATION_RESIDUAL) += residual;
     sums(j, STATION_INFORMATION) += information;

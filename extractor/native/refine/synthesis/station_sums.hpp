@@ -13,7 +13,7 @@ inline constexpr Index STATION_RESIDUAL = 0, STATION_INFORMATION = 1, STATION_SU
 // the information. A pixel belongs to the nearest station; its weight is the derivative of the drawing by an
 // offset of the whole gridline.
 //
-// pixels: after accumulate_sums.
+// pixels: after accumulate_sums; their projection and information become those of their stations.
 void accumulate_station_sums(const RowBlock& block, const PixelGeometry& line, GridlinePixels& pixels,
                              View<double, 2> sums);
 
