@@ -38,7 +38,7 @@ class Steps:
         if is_doubt:
             print_warning(text)
         else:
-            say_text(f"{visible(text)}\n")
+            say_text(f"{text}\n")
         if self._progress is not None:
             self._progress.start()
 

@@ -311,7 +311,7 @@ def _give_notice(run: TrackingRun) -> None:
     source = run.source
     for warning in (*run.warnings, *source.notes):
         warn(warning)
-    times = f"{source.name}: {source.times.text}"
+    times = f"{visible(source.name)}: {source.times.text}"
     if source.times.is_doubtful:
         warn(times)
     elif not source.is_live:

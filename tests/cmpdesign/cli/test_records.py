@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import Field
 
+from cmpdesign.cli.progress import working
 from cmpdesign.cli.records import print_maps, print_parts, print_rows
 from cmpdesign.documents.document import DocumentPart
 from cmpdesign.watch import notice, warn, watched
@@ -72,3 +73,12 @@ def test_a_watcher_is_told_at_once() -> None:
         warn("no times")
     warn("nobody watches")
     assert said == [("live at ws://127.0.0.1:8765", False), ("no times", True)]
+
+
+def test_lines_of_a_notice_stay_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    with working("verifying"):
+        notice("a.png: verified\n  refocus\x1b[2J")
+        warn("one\nline")
+    printed = capsys.readouterr()
+    assert printed.out == "a.png: verified\n  refocus\\x1b[2J\n"
+    assert printed.err == "warning: one\\nline\n"
