@@ -80,5 +80,5 @@ def test_lines_of_a_notice_stay_lines(capsys: pytest.CaptureFixture[str]) -> Non
         notice("a.png: verified\n  refocus\x1b[2J")
         warn("one\nline")
     printed = capsys.readouterr()
-    assert printed.out == "a.png: verified\n  refocus\\x1b[2J\n"
+    assert printed.out == "a.png: verified\n  refocus\\u001b[2J\n"
     assert printed.err == "warning: one\\nline\n"
