@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from cmpdesign.api.datasets import extract as extract
     from cmpdesign.api.designs import Design as Design
     from cmpdesign.api.designs import load as load
-    from cmpdesign.api.force import calibrate_force as calibrate_force
-    from cmpdesign.api.force import calibrate_gel as calibrate_gel
     from cmpdesign.api.layouts import Layout as Layout
     from cmpdesign.api.layouts import build_layout as build_layout
     from cmpdesign.api.layouts import read_layout as read_layout
@@ -58,13 +56,14 @@ if TYPE_CHECKING:
     from cmpdesign.api.plots import plot_layout as plot_layout
     from cmpdesign.api.plots import plot_markers as plot_markers
     from cmpdesign.api.sequences import cameras as cameras
-    from cmpdesign.api.sequences import load_run as load_run
     from cmpdesign.api.sequences import open_source as open_source
     from cmpdesign.api.sequences import reconstruct as reconstruct
     from cmpdesign.api.sequences import recover_run as recover_run
     from cmpdesign.api.sequences import track as track
     from cmpdesign.api.verifying import Verifier as Verifier
     from cmpdesign.api.verifying import verify as verify
+    from cmpdesign.api.workshop import calibrate_force as calibrate_force
+    from cmpdesign.api.workshop import calibrate_gel as calibrate_gel
     from cmpdesign.api.workshop import evaluate as evaluate
     from cmpdesign.api.workshop import export_lerobot as export_lerobot
     from cmpdesign.api.workshop import export_zarr as export_zarr
@@ -78,7 +77,7 @@ if TYPE_CHECKING:
     from cmpdesign.inputs.cameras import CameraSettings as CameraSettings
     from cmpdesign.layout.checks import check_design as check_design
     from cmpdesign.products.drawing.svg import write_svg as write_svg
-    from cmpdesign.proposal.camera_design import size as size
+    from cmpdesign.proposal.sizing import size as size
     from cmpdesign.runtime.health import Health as Health
     from cmpdesign.runtime.opening import Sensors as Sensors
     from cmpdesign.runtime.opening import open_sensor as open_sensor
@@ -87,6 +86,8 @@ if TYPE_CHECKING:
     from cmpdesign.runtime.sensor import LateError as LateError
     from cmpdesign.runtime.sensor import Sensor as Sensor
     from cmpdesign.runtime.zero import TouchedError as TouchedError
+    from cmpdesign.tracking.export.runs import load_run as load_run
+    from cmpdesign.tracking.jobs.options import ReadingOptions as ReadingOptions
     from cmpdesign.tracking.jobs.options import SequenceOptions as SequenceOptions
     from cmpdesign.tracking.jobs.options import ShapeOptions as ShapeOptions
     from cmpdesign.tracking.jobs.options import TrackOptions as TrackOptions
@@ -107,6 +108,7 @@ _HOMES = {
     "SensorFrame": "cmpdesign.runtime.result",
     "SensorFrames": "cmpdesign.runtime.result",
     "Sensors": "cmpdesign.runtime.opening",
+    "ReadingOptions": "cmpdesign.tracking.jobs.options",
     "SequenceOptions": "cmpdesign.tracking.jobs.options",
     "ShapeOptions": "cmpdesign.tracking.jobs.options",
     "TouchedError": "cmpdesign.runtime.zero",
@@ -116,8 +118,8 @@ _HOMES = {
     "build_layout": "cmpdesign.api.layouts",
     "calibrate_camera": "cmpdesign.api.calibration",
     "calibrate_check": "cmpdesign.api.calibration",
-    "calibrate_force": "cmpdesign.api.force",
-    "calibrate_gel": "cmpdesign.api.force",
+    "calibrate_force": "cmpdesign.api.workshop",
+    "calibrate_gel": "cmpdesign.api.workshop",
     "calibrate_pattern": "cmpdesign.api.calibration",
     "calibrate_rig": "cmpdesign.api.calibration",
     "cameras": "cmpdesign.api.sequences",
@@ -132,7 +134,7 @@ _HOMES = {
     "kerf": "cmpdesign.api.workshop",
     "layout_to_json": "cmpdesign.files.layout_json",
     "load": "cmpdesign.api.designs",
-    "load_run": "cmpdesign.api.sequences",
+    "load_run": "cmpdesign.tracking.export.runs",
     "load_scene": "cmpdesign.api.pictures",
     "open_sensor": "cmpdesign.runtime.opening",
     "open_source": "cmpdesign.api.sequences",
@@ -145,7 +147,7 @@ _HOMES = {
     "recover_run": "cmpdesign.api.sequences",
     "render": "cmpdesign.api.pictures",
     "schema": "cmpdesign.api.making",
-    "size": "cmpdesign.proposal.camera_design",
+    "size": "cmpdesign.proposal.sizing",
     "templates": "cmpdesign.api.making",
     "track": "cmpdesign.api.sequences",
     "verify": "cmpdesign.api.verifying",

@@ -69,7 +69,7 @@ def score_markers(markers: Markers, truth: Truth) -> DemoScore:
 
 def main() -> int:
     """Run the commands and print the table; the exit code of the first command that fails, or 0."""
-    from cmpdesign.cli.app import app
+    from cmpdesign.cli import app
     from cmpdesign.cli.terminal import console
 
     for command in COMMANDS:

@@ -19,13 +19,12 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from cmpdesign.cli.terminal import printable_path
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.atomic import write_folder
 from cmpdesign.files.image_header import open_header
 from cmpdesign.files.images import ImageFileError, decode_bytes
 from cmpdesign.inputs.files import MAX_TEXT_BYTES, open_file, require_size
-from cmpdesign.inputs.texts import one_line
+from cmpdesign.inputs.texts import one_line, visible
 from cmpdesign.reading.problem_report import ReportDocument, parse_report
 from extractor import ExtractorError, parse_layout
 
@@ -135,7 +134,7 @@ def main() -> None:
     except ReportError as error:
         sys.exit(f"error: {one_line(error)}")
     print(
-        f"wrote {printable_path(folder)}; it is tested by: python -m pytest tests/extractor/reported -k {folder.name}"
+        f"wrote {visible(str(folder))}; it is tested by: python -m pytest tests/extractor/reported -k {folder.name}"
     )
 
 

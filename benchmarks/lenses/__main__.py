@@ -155,9 +155,9 @@ def corners_text(path: Path) -> str:
             f"  {name:36s} {inside:.3f}   {rms_of(left):.3f}   {np.nanmedian(left):.3f}   {np.isnan(left).sum()}"
         )
     found = calibrate_points(sheet, sightings, SIZE_PX)
-    refused = [f"{one.name} ({one.cause})" for one in found.pictures if not one.used]
+    refused = [f"{one.picture} ({one.cause})" for one in found.pictures if not one.used]
     worst = sorted(found.pictures, key=lambda one: -one.scale)[:3]
-    lines.append("  largest: " + ", ".join(f"{one.name} {one.rms_px * 2**0.5:.2f} px" for one in worst))
+    lines.append("  largest: " + ", ".join(f"{one.picture} {one.rms_px * 2**0.5:.2f} px" for one in worst))
     lines.append(
         f"  this solver: {found.model.name}, bent by {found.bend_mm:.3f} squares, {found.rms_px * 2**0.5:.3f} px"
     )

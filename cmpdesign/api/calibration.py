@@ -5,44 +5,38 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import UTC, date, datetime
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
+from cmpdesign import documents
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
 from cmpdesign.inputs.options import Preset, Response, Side, Written
-from cmpdesign.watch import tell
+from cmpdesign.watch import tell, warn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.calibration.camera import CameraCalibration
-    from cmpdesign.calibration.rig.calibration import RigCalibration
-    from cmpdesign.calibration.rig.check import SensorCheck
-    from cmpdesign.documents.calibration import (
-        CalibrateCameraDocument,
-        CalibrateCheckDocument,
-        CalibrateRigDocument,
-    )
-    from cmpdesign.documents.reading import CalibratePatternDocument
     from cmpdesign.inputs.cameras import CameraState
-    from cmpdesign.layout.layout import Layout as AnyLayout
     from cmpdesign.sensor.sensor_file import SensorFile
-    from extractor import LayoutLike, LearntLayout, Markers, Reference, Rig
+    from extractor import LearntLayout, Markers, Reference, Rig
 
 MAX_WAY_MM = 100  # of a step
+# RMS per axis; well above the scatter of a made pad (0.01), below that of a round pattern read as honeycomb (0.2).
+MAX_USUAL_SCATTER_PITCHES = 0.1
 
 
 def calibrate_camera(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
     output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,
     preset: Preset = "balanced",
     response: Response | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> CalibrateCameraDocument:
+) -> documents.calibration.CalibrateCameraDocument:
     """Calibrate a camera: focal lengths, principal point, distortion, with covariances. Take pictures at many tilts.
 
     >>> camera = cmpdesign.calibrate_camera("layout.json", "sheet/", "camera.toml")
@@ -65,7 +59,6 @@ def calibrate_camera(
     from cmpdesign.calibration.camera import calibrate_points
     from cmpdesign.calibration.pictures import SheetPictures, read_sheets
     from cmpdesign.calibration.response import likely_response
-    from cmpdesign.documents.calibration import CalibrateCameraDocument
     from extractor import Extractor
 
     require_suffix("output", output, ".toml")
@@ -90,46 +83,38 @@ def calibrate_camera(
     if response is None and all(picture.dtype.itemsize == 1 for picture in pictures):
         used, calibration = likely_response(calibration, read)
     written = () if output is None else _write_camera(calibration, used, Path(output), names)
-    return CalibrateCameraDocument.of(
-        calibration, written=written, response=used, **_camera_figures(calibration, found.unread)
+    view, parameters = calibration.camera, calibration.model.names
+    values = view.focal_px + view.centre_px + view.distortion
+    deviations = calibration.cov.diagonal() ** 0.5
+    unread = [
+        {"picture": name, "points": 0, "rms_px": None, "cause": f"not read: {reason}"}
+        for name, reason in found.unread.items()
+    ]
+    return documents.calibration.CalibrateCameraDocument.of(
+        calibration,
+        written=written,
+        response=used,
+        size_px=found.size_px,
+        model=calibration.model.name,
+        scale=calibration.adjusted.base,
+        sheet_bend_mm=calibration.bend_mm,
+        further_view=calibration.advice.text,
+        further_view_ray_px=calibration.advice.ray_px,
+        parameters=dict(zip(parameters, values, strict=True)),
+        deviations=dict(zip(parameters, deviations.tolist(), strict=True)),
+        pictures=[*calibration.pictures, *unread],
     )
 
 
-def _camera_figures(found: CameraCalibration, unread: Mapping[str, str]) -> dict[str, Any]:
-    """The fields of ``CalibrateCameraDocument`` that describe the camera and its pictures."""
-    view, names = found.camera, found.model.names
-    values = view.focal_px + view.centre_px + view.distortion
-    pictures = [
-        {"picture": one.name, "points": one.points, "rms_px": one.rms_px, "cause": one.cause}
-        for one in found.pictures
-    ]
-    pictures += [
-        {"picture": name, "points": 0, "rms_px": None, "cause": f"not read: {reason}"}
-        for name, reason in unread.items()
-    ]
-    return {
-        "size_px": found.adjusted.problem.size_px,
-        "model": found.model.name,
-        "parameters": dict(zip(names, values, strict=True)),
-        "deviations": dict(zip(names, map(float, found.cov.diagonal() ** 0.5), strict=True)),
-        "rms_px": found.rms_px,
-        "scale": found.adjusted.base,
-        "sheet_bend_mm": found.bend_mm,
-        "further_view": found.advice.text,
-        "further_view_ray_px": found.advice.ray_px,
-        "pictures": pictures,
-    }
-
-
 def calibrate_pattern(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     images: str | Path | Sequence[str | Path] | Sequence[NDArray[Any]],
     output: Annotated[str | Path | None, Written(needed=True)] = None,
     *,
     preset: Preset = "accurate",
     response: Response | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> CalibratePatternDocument:
+) -> documents.reading.CalibratePatternDocument:
     """Measure the places of one pad's markers. Read the pad's pictures with the written layout.
 
     >>> made = cmpdesign.calibrate_pattern("layout.json", "at_rest/", "made.json")
@@ -152,12 +137,7 @@ def calibrate_pattern(
     from extractor import learn_layout
 
     require_suffix("output", output, ".json")
-    if (
-        output is not None
-        and isinstance(layout, str | Path)
-        and Path(output).resolve() == Path(layout).resolve()
-    ):
-        raise CmpDesignError(f"{output} is the nominal layout itself; give another name")
+    _require_other(output, layout, "the nominal layout itself")
     names, pictures = read_pictures(images, max_pixels)
     learnt = learn_layout(
         reference_from(layout),
@@ -172,21 +152,33 @@ def calibrate_pattern(
     return _pattern_document(learnt, str(output or ""))
 
 
-def _pattern_document(learnt: LearntLayout, written: str) -> CalibratePatternDocument:
+def _pattern_document(learnt: LearntLayout, written: str) -> documents.reading.CalibratePatternDocument:
     import numpy as np
-
-    from cmpdesign.documents.reading import CalibratePatternDocument
 
     made, worst = learnt.layout.as_made, int(learnt.picture_z.argmax())
     assert made is not None and made.covariance_mm2 is not None
     variance = made.covariance_mm2[learnt.measured].trace(axis1=1, axis2=2) / 2
-    return CalibratePatternDocument.of(
+    ends_mm = learnt.layout.xy_mm[learnt.layout.edges]
+    scatter = learnt.scatter_mm / float(np.linalg.norm(ends_mm[:, 1] - ends_mm[:, 0], axis=1).mean())
+    if scatter > MAX_USUAL_SCATTER_PITCHES:
+        warn(
+            f"the markers lie {scatter:.2f} pitches per axis from their nominal places, limit "
+            f"{MAX_USUAL_SCATTER_PITCHES:g}; check that {parameter('layout')} is this pad's, unless the lens "
+            "distorts strongly"
+        )
+    present, measured = int(learnt.layout.present.sum()), int(learnt.measured.sum())
+    if measured < present:
+        warn(
+            f"{present - measured} of {present} markers are measured in no picture and stay at their "
+            "nominal places; show the whole pad in some pictures"
+        )
+    return documents.reading.CalibratePatternDocument.of(
         learnt,
         written=written,
         pictures=len(learnt.picture_z),
         side=made.side,
-        present=int(learnt.layout.present.sum()),
-        measured=int(learnt.measured.sum()),
+        present=present,
+        measured=measured,
         residual_z=float(learnt.z),
         worst_picture=worst,
         worst_picture_z=float(learnt.picture_z[worst]),
@@ -197,7 +189,7 @@ def _pattern_document(learnt: LearntLayout, written: str) -> CalibratePatternDoc
 
 
 def calibrate_rig(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     rig: str | Path,
     rest: str | Path | Sequence[str | Path],
     output: Annotated[str | Path | None, Written(needed=True)] = None,
@@ -209,7 +201,7 @@ def calibrate_rig(
     step_sigma_mm: Annotated[float, Written(metavar="MM", least=1e-6)] = 0.002,
     side: Side = "designed",
     max_pixels: int = MAX_PIXELS,
-) -> CalibrateRigDocument:
+) -> documents.calibration.CalibrateRigDocument:
     """Calibrate the views, the window and the gel of a sensor. What remains undetermined is stated and named.
 
     >>> found = cmpdesign.calibrate_rig("layout.json", "measured.toml", ["rest.png"], "sensor.toml")
@@ -241,8 +233,11 @@ def calibrate_rig(
             raise CmpDesignError(f"{parameter('steps')}: a way of {way_mm:g} mm, limit {MAX_WAY_MM} mm")
     require_suffix("output", output, ".toml")
     sensor, reference = load_sensor_file(rig), reference_from(layout)
-    if output is not None:
-        _require_beside(Path(rig), Path(output))
+    _require_other(output, rig, "RIG itself, whose measured values a further calibration needs")
+    if output is not None and Path(output).resolve().parent != Path(rig).resolve().parent:
+        raise CmpDesignError(
+            f"{output}: write the file beside {rig}, since files are named relative to its folder"
+        )
     given = [rest] if isinstance(rest, str | Path) else list(rest)
     names = [*map(str, given), *map(str, ways.values())]
     found = _read_views(sensor, reference, sensor.rig.without_poses(), names, side, max_pixels)
@@ -262,34 +257,12 @@ def calibrate_rig(
         dated = [name for whole in names[: len(given)] for name in whole.split(",")]
         text = calibrated_text(sensor, calibration, reference, len(given), tuple(ways), _date_of(dated))
         write_file(Path(output), text)
-    return _rig_document(calibration, str(output or ""), len(given), tuple(ways))
-
-
-def _rig_document(
-    found: RigCalibration, written: str, pictures: int, steps_mm: tuple[float, ...]
-) -> CalibrateRigDocument:
-    from cmpdesign.documents.calibration import CalibrateRigDocument
-
-    names = found.names[: len(found.values)]
-    mirrors = [
-        {
-            "views": pair.views,
-            "normals": tuple(tuple(plane.normal.tolist()) for plane in pair.planes),
-            "distances_mm": tuple(plane.distance_mm for plane in pair.planes),
-            "angle_deg": pair.angle_deg,
-            "shift_mm": pair.shift_mm,
-        }
-        for pair in found.mirrors
-    ]
-    return CalibrateRigDocument.of(
-        found,
-        written=written,
-        pictures=pictures,
-        steps_mm=steps_mm,
-        parameters=dict(zip(names, found.values.tolist(), strict=True)),
-        stated=dict(zip(names, found.stated.tolist(), strict=True)),
-        deviations=dict(zip(found.names, found.deviations.tolist(), strict=True)),
-        mirrors=mirrors,
+    return documents.calibration.CalibrateRigDocument.of(
+        calibration,
+        written=str(output or ""),
+        pictures=len(given),
+        steps_mm=tuple(ways),
+        **calibration.by_name(),
     )
 
 
@@ -297,9 +270,9 @@ def calibrate_check(
     sensor: str | Path,
     images: Annotated[str | Path | Sequence[str | Path], Written(metavar="REST")] = (),
     *,
-    layout: LayoutLike | AnyLayout | None = None,
+    layout: AnyLayout | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> CalibrateCheckDocument:
+) -> documents.calibration.CalibrateCheckDocument:
     """Check a sensor by its pad at rest: cameras, light, focus, markers read, residuals, force scale, ages.
 
     If the calibration does not hold, the cause and the step to repeat are named.
@@ -342,17 +315,13 @@ def calibrate_check(
         found, cameras, names = [live.markers], live.cameras, [file.table.camera.source]
     before = file.table.calibration.rig
     stated = before.rms_px if before is not None and len(before.rms_px) == len(file.rig.views) else ()
-    checked = check_markers(
+    return check_markers(
         reference,
         file.rig,
-        found,
+        dict(zip(names, found, strict=True)),
         stated_px=dict(zip(file.rig.names, stated, strict=False)),
         scale=before.scale if before is not None else 1.0,
         limit_px=file.table.limits.max_rest_error_px,
-    )
-    return _check_document(
-        checked,
-        names,
         views=view_states(file, reference, found[-1]),
         cameras=camera_states(cameras),
         force=force_scale(file, reference),
@@ -360,36 +329,11 @@ def calibrate_check(
     )
 
 
-def _check_document(found: SensorCheck, names: Sequence[str], **state: Any) -> CalibrateCheckDocument:
-    from cmpdesign.documents.calibration import CalibrateCheckDocument
-
-    causes = [
-        {
-            "cause": one.cause,
-            "left": one.left,
-            "changes": dict(one.changes),
-            "likely": one.cause in found.likely,
-        }
-        for one in found.causes
-    ]
-    return CalibrateCheckDocument.of(
-        found,
-        picture_misfits=dict(zip(names, found.picture_misfits, strict=True)),
-        causes=causes,
-        depth_error=found.depth_error if isfinite(found.depth_error) else None,
-        **state,
-    )
-
-
-def _require_beside(rig: Path, output: Path) -> None:
-    if output.resolve() == rig.resolve():
-        raise CmpDesignError(
-            f"{output} is RIG itself, whose measured values a further calibration needs; choose another name"
-        )
-    if output.resolve().parent != rig.resolve().parent:
-        raise CmpDesignError(
-            f"{output}: write the file beside {rig}, since files are named relative to its folder"
-        )
+def _require_other(output: str | Path | None, given: object, what: str) -> None:
+    """Check that the file to write is not the given one."""
+    given_file = Path(given).resolve() if isinstance(given, str | Path) else None
+    if output is not None and Path(output).resolve() == given_file:
+        raise CmpDesignError(f"{output} is {what}; choose another name")
 
 
 def _read_views(

@@ -4,28 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Unpack
 
+from cmpdesign import documents
 from cmpdesign.errors import CmpDesignError, parameter
-from cmpdesign.inputs.options import Channels, Preset, Response, Side, Usual, Written, settled
+from cmpdesign.inputs.options import Written, settled
+from cmpdesign.tracking.jobs.options import ReadingOptions
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
-    from cmpdesign.layout.layout import Layout as AnyLayout
-    from extractor import LayoutLike
-
-
-class ReadingOptions(TypedDict, total=False):
-    """Options of ``extract``: how frames are read.
-
-    Keys:
-        preset, response, side, channels: see ``SequenceOptions``.
-    """
-
-    preset: Annotated[Preset, Usual("balanced")]
-    response: Annotated[Response | None, Usual(None, metavar="srgb|linear|EXPONENT")]
-    side: Annotated[Side, Usual("designed")]
-    channels: Annotated[Channels, Usual("bgr")]
+    from cmpdesign.api.layouts import AnyLayout
 
 
 def dataset(
@@ -37,7 +24,7 @@ def dataset(
     workers: Annotated[int | None, Written(least=1)] = None,
     inputs_from: Annotated[Sequence[str | Path], Written(metavar="FOLDER")] = (),
     check: bool = False,
-) -> DatasetDocument | DatasetCheckDocument:
+) -> documents.data.DatasetDocument | documents.data.DatasetCheckDocument:
     """Make a data set: pictures, truth, markers, forces and parameters of the frames that a plan names.
 
     The same call continues an interrupted data set. A program that calls this with the scheduler "local" needs
@@ -65,23 +52,22 @@ def dataset(
     from cmpdesign.data.run import make_dataset, parse_shards
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.design.templates import find_plan
-    from cmpdesign.documents.data import DatasetCheckDocument, DatasetDocument
 
     if check:
         if output or shards or inputs_from:
             raise CmpDesignError(
                 f"{parameter('check')} takes the folder of a data set alone; leave out the other options"
             )
-        return DatasetCheckDocument.of(check_folder(plan), folder=str(plan))
+        return documents.data.DatasetCheckDocument.of(check_folder(plan), folder=str(plan))
     if output is None:
         raise CmpDesignError(f"{parameter('output')} is missing; give the folder of the data set")
     where = parse_scheduler(scheduler, workers)
     made = make_dataset(find_plan(plan), output, parse_shards(shards), where, inputs_from)
-    return DatasetDocument.of(made, written=str(output))
+    return documents.data.DatasetDocument.of(made, written=str(output))
 
 
 def extract(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     sources: str | Path | Sequence[str | Path],
     output: Annotated[str | Path, Written(metavar="FOLDER")],
     *,
@@ -89,7 +75,7 @@ def extract(
     scheduler: Annotated[str, Written(metavar="local|dask=ADDRESS")] = "local",
     workers: Annotated[int | None, Written(least=1)] = None,
     **reading: Unpack[ReadingOptions],
-) -> DatasetDocument:
+) -> documents.data.DatasetDocument:
     """Read the markers of every frame of many sources into Parquet files, each frame independently of the others.
 
     >>> cmpdesign.extract("layout.json", ["monday/*.mp4", "tuesday/*.mp4"], "markers")
@@ -111,9 +97,8 @@ def extract(
     from cmpdesign.data.run import extract_markers
     from cmpdesign.data.schedule.schedulers import parse_scheduler
     from cmpdesign.data.videos.extraction import FrameReading
-    from cmpdesign.documents.data import DatasetDocument
 
     texts = [str(text) for text in ([sources] if isinstance(sources, str | Path) else sources)]
     how, where = FrameReading(**settled(ReadingOptions, reading)), parse_scheduler(scheduler, workers)
     made = extract_markers(reference_from(layout), texts, output, how, where, frames_a_shard)
-    return DatasetDocument.of(made, written=str(output))
+    return documents.data.DatasetDocument.of(made, written=str(output))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cmpdesign.api.layouts import Layout, build_layout
 from cmpdesign.design.design import Design as Parameters
 from cmpdesign.design.design import load_design
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.inputs.options import Preset, pixels_of
 from cmpdesign.layout.checks import CAMERA_PX
 from cmpdesign.products.building import Built, Checked, build_files, check_products
 from cmpdesign.products.registry import USUAL_NAMES, chosen_products
@@ -77,20 +77,24 @@ class Design(Parameters):
 
         return design_report(self, self.layout)
 
-    def check(self, camera: tuple[int, int] = CAMERA_PX, *, read: bool = False) -> Checked:
+    def check(
+        self, camera: tuple[int, int] = CAMERA_PX, *, read: bool = False, preset: Preset = "balanced"
+    ) -> Checked:
         """The features that cannot be made or read, as in the command ``check``.
 
         Args:
             camera: width and height in px of the camera whose picture the pattern fills.
             read: also draw and read the pads that laser, mold and print would make.
+            preset: see ``SequenceOptions``.
         """
-        return check_products(self, self.layout, checked_camera(camera), read=read)
+        return check_products(self, self.layout, pixels_of("camera", camera), read=read, preset=preset)
 
     def write(
         self,
         folder: str | Path = "out",
         products: str | Iterable[str] = USUAL_NAMES,
         camera: tuple[int, int] = CAMERA_PX,
+        preset: Preset = "balanced",
     ) -> Built:
         """Write the design's files, as the command ``build`` does.
 
@@ -98,14 +102,14 @@ class Design(Parameters):
             folder: folder for the files; made if missing. Files of earlier builds that do not belong to this design
                 are removed, unless they were changed.
             products: products to make: svg, layout, preview, report, laser, mold, mesh, print.
-            camera: see ``check``; pads of lasers, molds and prints are read as this camera sees them.
+            camera, preset: see ``check``; pads of lasers, molds and prints are read as this camera sees them.
 
         Raises:
             CmpDesignError: an unknown product, or a product that cannot be made; no file is written.
             OutputError: a file cannot be written.
         """
-        names = products if isinstance(products, str) else ",".join(products)
-        return build_files(self, self.layout, folder, chosen_products(names), checked_camera(camera))
+        names = chosen_products(products if isinstance(products, str) else ",".join(products))
+        return build_files(self, self.layout, folder, names, pixels_of("camera", camera), preset=preset)
 
     def __repr__(self) -> str:
         given = ", ".join(
@@ -122,10 +126,7 @@ class Design(Parameters):
         """The pattern, its key figures and its findings, for notebooks."""
         report = self.report
         rows = {
-            "pattern": f"{report.pattern}, {report.layers} layers, pitch {report.pitch_mm:.4g} mm",
-            "markers": str(report.present_markers),
-            "size": "{:.2f} x {:.2f} mm".format(*report.size_mm),
-            "smallest feature": f"{report.smallest_feature_mm:.3f} mm",
+            **report.figures(),
             "digest": report.digest[:12],
             **{f"{finding.severity} {i}": str(finding) for i, finding in enumerate(report.findings, 1)},
         }
@@ -157,17 +158,3 @@ def load(
     <Design 'honeycomb': honeycomb, pitch_mm=1.524, layers=3>
     """
     return Design.of(load_design(name_or_path, {**(overrides or {}), **changes}))
-
-
-def checked_camera(camera: tuple[int, int]) -> tuple[int, int]:
-    """The camera's width and height.
-
-    Raises:
-        CmpDesignError: not two whole numbers of 10 px or more.
-    """
-    sides = tuple(camera)
-    if len(sides) != 2 or not all(isinstance(side, int) and side >= 10 for side in sides):
-        raise CmpDesignError(
-            f"camera is {camera!r}; expected (width, height) of 10 px or more, as (640, 480)"
-        )
-    return sides[0], sides[1]

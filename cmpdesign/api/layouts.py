@@ -16,6 +16,8 @@ from cmpdesign.layout.build import build_layout as build
 if TYPE_CHECKING:
     from extractor import LayoutLike, Reference
 
+    AnyLayout = LayoutLike | layouts.Layout
+
 NOTEBOOK_PX = 420  # longer side of a drawing in a notebook
 
 
@@ -96,32 +98,26 @@ def build_layout(design: Parameters) -> Layout:
     return Layout.of(build(design))
 
 
-def read_layout(path: str | Path) -> Layout:
+def read_layout(path: AnyLayout) -> Layout:
     """Read a ``layout.json``.
+
+    Args:
+        path: the file; or a ``Layout``, a ``Reference`` or the JSON object of a layout file.
 
     Raises:
         extractor.LayoutError: the file cannot be read or contradicts itself.
-    """
-    return layout_from(path)
-
-
-def layout_from(given: LayoutLike | layouts.Layout) -> Layout:
-    """The layout that a caller gives as a path, a ``Layout``, a ``Reference`` or the JSON object of a layout file.
-
-    Raises:
-        extractor.LayoutError: a file or an object that is no layout.
         TypeError: another value.
     """
-    if isinstance(given, layouts.Layout):
-        return Layout.of(given)
+    if isinstance(path, layouts.Layout):
+        return Layout.of(path)
     from cmpdesign.reading.read_layout import layout_from_reference
     from extractor import layout_of
 
-    return Layout.of(layout_from_reference(layout_of(given)))
+    return Layout.of(layout_from_reference(layout_of(path)))
 
 
-def reference_from(given: LayoutLike | layouts.Layout) -> Reference:
-    """The reader's value of a layout; ``given`` and errors as for ``layout_from``."""
+def reference_from(given: AnyLayout) -> Reference:
+    """The reader's value of a layout; ``given`` and errors as for ``read_layout``."""
     if isinstance(given, layouts.Layout):
         return Layout.of(given).reference()
     from extractor import layout_of

@@ -6,20 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from cmpdesign import documents
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.options import Preset, Written
-from cmpdesign.products.registry import USUAL_NAMES, chosen_products
+from cmpdesign.products.registry import USUAL_NAMES
 
 if TYPE_CHECKING:
     from cmpdesign.api.designs import Design
     from cmpdesign.design.design import Design as Parameters
-    from cmpdesign.documents.designs import (
-        BuildDocument,
-        CheckDocument,
-        InitDocument,
-        TemplateDocument,
-        TemplatesDocument,
-    )
 
 CAMERA_PX = (640, 480)
 TemplateKind = Literal["designs", "scenes", "plans", "machines", "materials", "silicones", "sensors"]
@@ -30,15 +24,14 @@ def build(
     output: Annotated[str | Path, Written(metavar="FOLDER")] = "out",
     *,
     overrides: Annotated[
-        Mapping[str, object] | None,
-        Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm"),
+        Mapping[str, object] | None, Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm")
     ] = None,
     products: Annotated[
         str | Iterable[str], Written(name="--only", metavar="NAMES", with_commas=True)
     ] = USUAL_NAMES,
     camera: Annotated[tuple[int, int], Written(metavar="WxH")] = CAMERA_PX,
     preset: Preset = "balanced",
-) -> BuildDocument:
+) -> documents.designs.BuildDocument:
     """Write a design's files.
 
     >>> cmpdesign.build("tac3d", "mine").findings
@@ -55,15 +48,10 @@ def build(
         CmpDesignError: an unknown product, or a product that cannot be made; no file is written.
         OutputError: a file cannot be written.
     """
-    from cmpdesign.api.designs import checked_camera
-    from cmpdesign.documents.designs import BuildDocument
     from cmpdesign.layout.report import report_values
-    from cmpdesign.products.building import build_files
 
-    names = chosen_products(products if isinstance(products, str) else ",".join(products))
-    chosen, camera_px = _design(design, overrides), checked_camera(camera)
-    built = build_files(chosen, chosen.layout, output, names, camera_px, preset=preset)
-    return BuildDocument.of(
+    built = _design(design, overrides).write(output, products, camera, preset)
+    return documents.designs.BuildDocument.of(
         built,
         digest=built.report.digest,
         folder=str(output),
@@ -78,26 +66,21 @@ def check(
     design: str | Path | Parameters,
     *,
     overrides: Annotated[
-        Mapping[str, object] | None,
-        Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm"),
+        Mapping[str, object] | None, Written(name="--set", metavar="NAME=VALUE", example="pitch_mm=1.5mm")
     ] = None,
     camera: Annotated[tuple[int, int], Written(metavar="WxH")] = CAMERA_PX,
     read: bool = False,
     preset: Preset = "balanced",
-) -> CheckDocument:
+) -> documents.designs.CheckDocument:
     """List the features of a design that cannot be made or read.
 
     Args:
         design, overrides, camera, preset: see ``build``.
         read: draw and read the pads that laser, mold and print would make.
     """
-    from cmpdesign.api.designs import checked_camera
-    from cmpdesign.documents.designs import CheckDocument
-    from cmpdesign.products.building import check_products
-
     chosen = _design(design, overrides)
-    checked = check_products(chosen, chosen.layout, checked_camera(camera), read=read, preset=preset)
-    return CheckDocument.of(
+    checked = chosen.check(camera, read=read, preset=preset)
+    return documents.designs.CheckDocument.of(
         checked,
         digest=chosen.layout.digest,
         passed=checked.works,
@@ -121,7 +104,7 @@ def init(
     sensor: Annotated[str | Path | None, Written(metavar="LAYOUT")] = None,
     camera: Annotated[Sequence[str | Path], Written(metavar="FILE")] = (),
     force: bool = False,
-) -> InitDocument:
+) -> documents.designs.InitDocument:
     """Write a commented design file, or a sensor file.
 
     >>> cmpdesign.init("mine").written
@@ -141,7 +124,6 @@ def init(
     """
     from cmpdesign.design.commented_toml import commented_toml
     from cmpdesign.design.extends import require_extended
-    from cmpdesign.documents.designs import InitDocument
     from cmpdesign.files.atomic import write_file
     from cmpdesign.inputs.files import path_exists
 
@@ -163,7 +145,7 @@ def init(
             require_extended(extends, file)
         text = commented_toml(extends)
     write_file(file, text)
-    return InitDocument(written=str(file), extends=extends)
+    return documents.designs.InitDocument(written=str(file), extends=extends)
 
 
 def _sensor_text(file: Path, layout: Path, cameras: Sequence[Path]) -> str:
@@ -196,7 +178,7 @@ def schema(command: str = "") -> dict[str, Any]:
 
 def templates(
     kind: TemplateKind | None = None, show: Annotated[str | None, Written(metavar="NAME")] = None
-) -> TemplatesDocument | TemplateDocument:
+) -> documents.designs.TemplatesDocument | documents.designs.TemplateDocument:
     """List or show the templates.
 
     >>> [one.name for one in cmpdesign.templates("scenes").templates]
@@ -209,16 +191,15 @@ def templates(
         DesignError: no such template.
     """
     from cmpdesign.design.templates import find_template, template_kinds, template_words
-    from cmpdesign.documents.designs import TemplateDocument, TemplatesDocument
     from cmpdesign.inputs.files import read_text
 
     if show is not None:
         found, path = find_template(show if kind is None or "/" in show else f"{kind}/{show}")
-        return TemplateDocument(kind=found, name=path.stem, text=read_text(path))
+        return documents.designs.TemplateDocument(kind=found, name=path.stem, text=read_text(path))
     listed = [
         {"kind": each, "name": name, **template_words(path)._asdict()}
         for each, names in template_kinds().items()
         if kind in (None, each)
         for name, path in names.items()
     ]
-    return TemplatesDocument.model_validate({"templates": listed})
+    return documents.designs.TemplatesDocument.model_validate({"templates": listed})

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypedDict, Unpack
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
+from cmpdesign import documents
 from cmpdesign.errors import CmpDesignError, parameter
 from cmpdesign.inputs.files import require_suffix
 from cmpdesign.inputs.options import Response, Usual, Written, settled
@@ -15,11 +15,9 @@ from cmpdesign.inputs.options import Response, Usual, Written, settled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.documents.runs import RenderDocument
-    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.scene import Scene
     from cmpdesign.scene.files.scene_file import SceneFile
-    from extractor import LayoutLike
 
     OneImage = str | Path | NDArray[Any]
 
@@ -63,7 +61,7 @@ class ViewOptions(TypedDict, total=False):
     response: Annotated[Response, Usual("srgb", metavar="srgb|linear|EXPONENT")]
 
 
-def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -> Scene:
+def plain_scene(layout: AnyLayout, seed: int = 0, **view: Unpack[ViewOptions]) -> Scene:
     """A scene of a pattern under one camera, without a scene file.
 
     Args:
@@ -75,10 +73,10 @@ def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[Vi
         SceneError: a value out of range; the message names it.
         TypeError: a name that ``ViewOptions`` does not have.
     """
-    from cmpdesign.api.layouts import layout_from
+    from cmpdesign.api.layouts import read_layout
     from cmpdesign.scene import Camera, Optics, Press, Scene, Sensor, composed
 
-    pattern, chosen = layout_from(layout), settled(ViewOptions, view)
+    pattern, chosen = read_layout(layout), settled(ViewOptions, view)
     radius_mm = chosen["press_radius_mm"]
     if radius_mm is None:
         radius_mm = min(pattern.size_mm) / 4
@@ -100,10 +98,7 @@ def plain_scene(layout: LayoutLike | AnyLayout, seed: int = 0, **view: Unpack[Vi
 
 
 def load_scene(
-    name_or_path: str | Path,
-    layout: LayoutLike | AnyLayout,
-    size: tuple[int, int] | None = None,
-    seed: int | None = None,
+    name_or_path: str | Path, layout: AnyLayout, size: tuple[int, int] | None = None, seed: int | None = None
 ) -> SceneFile:
     """Load a scene: a scene template's name or a TOML file.
 
@@ -115,15 +110,15 @@ def load_scene(
     Raises:
         CmpDesignError: no such scene, or a value that cannot be rendered.
     """
-    from cmpdesign.api.layouts import layout_from
+    from cmpdesign.api.layouts import read_layout
     from cmpdesign.design.templates import find_scene
     from cmpdesign.scene.files import scene_file
 
-    return scene_file.load_scene(find_scene(name_or_path), layout_from(layout), size_px=size, seed=seed)
+    return scene_file.load_scene(find_scene(name_or_path), read_layout(layout), size_px=size, seed=seed)
 
 
 def render(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     scene: Annotated[str | Path | None, Written(metavar="FILE")] = None,
     output: Annotated[str | Path | None, Written(metavar="IMAGE", needed=True)] = None,
     truth: Annotated[str | Path | None, Written(metavar="FILE")] = None,
@@ -131,7 +126,7 @@ def render(
     size: Annotated[tuple[int, int] | None, Written(metavar="WxH", most=9999)] = None,
     seed: Annotated[int | None, Written(least=0)] = None,
     **view: Unpack[ViewOptions],
-) -> RenderDocument:
+) -> documents.runs.RenderDocument:
     """Render a pattern as a camera sees the pattern. The picture is seeded, and exact to a thousandth of a pixel.
 
     >>> rendered = cmpdesign.render(layout, pitch_px=22, rotation_deg=12, tilt_deg=15, noise=2, seed=1)
@@ -160,8 +155,12 @@ def render(
     """
     require_suffix("truth", truth, ".npz")
     if scene is None:
-        with _scene_errors_name_parameters():
+        from cmpdesign.scene import SceneError
+
+        try:
             plain = plain_scene(layout, seed or 0, **view)
+        except SceneError as error:
+            raise SceneError(_by_parameter(str(error))) from None
         return _render_picture(plain, size or SIZE_PX, output, truth)
     for name in sorted(view):
         key = f"[{SCENE_FILE_TABLES.get(name, 'camera')}] {SCENE_FILE_KEYS.get(name, name)}"
@@ -184,11 +183,10 @@ def _render_picture(
     output: str | Path | None,
     truth: str | Path | None,
     file: SceneFile | None = None,
-) -> RenderDocument:
+) -> documents.runs.RenderDocument:
     """Draw a scene, which may be that of a file."""
     import numpy as np
 
-    from cmpdesign.documents.runs import RenderDocument
     from cmpdesign.files.images import require_image_kind
     from cmpdesign.scene import render as draw
     from cmpdesign.scene import save_truth
@@ -205,25 +203,22 @@ def _render_picture(
         save_truth(rendered.truth, truth)
     visible = np.atleast_2d(rendered.truth.visible).sum(axis=1).tolist()
     written = [str(path) for path in (truth, output) if path is not None]
-    return RenderDocument.of(rendered, written=written, size_px=size_px, frames=1, fps=None, visible=visible)
+    return documents.runs.RenderDocument.of(
+        rendered, written=written, size_px=size_px, frames=1, fps=None, visible=visible
+    )
 
 
-class RenderedSequence(NamedTuple):
-    """What a sequence leaves beside its files: warnings, one of each kind."""
-
-    warnings: tuple[str, ...]
-
-
-def _render_sequence(file: SceneFile, output: Path, truth: str | Path | None) -> RenderDocument:
-    from cmpdesign.documents.runs import RenderDocument
+def _render_sequence(
+    file: SceneFile, output: Path, truth: str | Path | None
+) -> documents.runs.RenderDocument:
     from cmpdesign.scene.files.sequence import write_sequence
 
     kinds: dict[str, str] = {}  # by letters, without numbers: the first frame of each kind
     for text, frame in write_sequence(file, output, None if truth is None else Path(truth)).items():
         kind = "".join(letter for letter in text if letter.isalpha())
         kinds.setdefault(kind, f"from frame {frame} ({file.time_s(frame):.3g} s) on: {text}")
-    return RenderDocument.of(
-        RenderedSequence(tuple(kinds.values())),
+    return documents.runs.RenderDocument.of(
+        SimpleNamespace(warnings=tuple(kinds.values())),
         written=[str(path) for path in (truth, output) if path is not None],
         size_px=file.size_px,
         frames=file.frames,
@@ -232,15 +227,8 @@ def _render_sequence(file: SceneFile, output: Path, truth: str | Path | None) ->
     )
 
 
-@contextmanager
-def _scene_errors_name_parameters() -> Iterator[None]:
-    """Within this context, errors of a scene name the parameter instead of the scene's field."""
-    from cmpdesign.scene import SceneError
-
-    try:
-        yield
-    except SceneError as error:
-        text = str(error)
-        for name in ViewOptions.__annotations__:
-            text = re.sub(rf"^{SCENE_FILE_KEYS.get(name, name)}(?= is )", parameter(name), text)
-        raise SceneError(text) from None
+def _by_parameter(text: str) -> str:
+    """The message of an error of a scene, which names the parameter instead of the scene's field."""
+    for name in ViewOptions.__annotations__:
+        text = re.sub(rf"^{SCENE_FILE_KEYS.get(name, name)}(?= is )", parameter(name), text)
+    return text

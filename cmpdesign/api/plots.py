@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cmpdesign.api.layouts import layout_from
+from cmpdesign.api.layouts import read_layout
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.libraries import extra
 from cmpdesign.patterns.colors import BLACK, COLORS
@@ -12,15 +12,15 @@ from cmpdesign.patterns.colors import BLACK, COLORS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.tracking.export.runs import Run
-    from extractor import LayoutLike, Markers
+    from extractor import Markers
 
 # Colors of the statuses lost, measured, repaired, fitted.
 _STATUS_COLORS = ("none", "#00e5ff", "#ffb300", "#ff4081")
 
 
-def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = False) -> Any:
+def plot_layout(layout: AnyLayout, ax: Any = None, *, ids: bool = False) -> Any:
     """Draw a pattern in mm, as seen from the front.
 
     Args:
@@ -37,7 +37,7 @@ def plot_layout(layout: LayoutLike | AnyLayout, ax: Any = None, *, ids: bool = F
     with extra("evaluate"):
         from matplotlib.collections import PolyCollection
 
-    axes, pattern = _axes(ax), layout_from(layout)
+    axes, pattern = _axes(ax), read_layout(layout)
     outline = PolyCollection([pattern.outline_mm], facecolors=[pattern.palette[COLORS[BLACK]]])
     colors = [pattern.palette[COLORS[color]] for color in pattern.cell_color[pattern.colored_cells].tolist()]
     axes.add_collection(outline)

@@ -7,30 +7,28 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
+from cmpdesign import documents
 from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.inputs.options import Written, settled
 from cmpdesign.tracking.jobs.options import ShapeOptions, TrackOptions
 
 if TYPE_CHECKING:
-    from cmpdesign.documents.runs import CamerasDocument, ReconstructDocument, RecoverDocument, TrackDocument
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.inputs.cameras import CameraSettings
-    from cmpdesign.layout.layout import Layout as AnyLayout
-    from cmpdesign.tracking.export.runs import Run
     from cmpdesign.tracking.jobs.job import ReconstructJob, TrackJob
     from cmpdesign.tracking.sources import FrameSource
-    from extractor import LayoutLike
 
 AnySource = str | Path | int | Sequence[str | Path]
 
 
 def track(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     source: AnySource,
     output: str | Path,
     *,
     on_frame: Callable[[Any], None] = lambda frame: None,
     **options: Unpack[TrackOptions],
-) -> TrackDocument:
+) -> documents.runs.TrackDocument:
     """Follow a pattern through a video, a folder or a camera into a table, as the command ``track`` does.
 
     >>> summary = cmpdesign.track("layout.json", "press.mp4", "run.npz", rest=0)
@@ -57,7 +55,7 @@ def track(
 
 
 def reconstruct(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     rig: str | Path,
     rest: Annotated[str | Path | int | Sequence[str | Path], Written(with_commas=True)],
     source: Annotated[str | Path | int | Sequence[str | Path | int], Written(with_commas=True)],
@@ -65,7 +63,7 @@ def reconstruct(
     *,
     on_frame: Callable[[Any], None] = lambda frame: None,
     **options: Unpack[ShapeOptions],
-) -> ReconstructDocument:
+) -> documents.runs.ReconstructDocument:
     """Reconstruct the surface in space from two or more views, as the command ``reconstruct`` does.
 
     >>> cmpdesign.reconstruct("layout.json", "rig.toml", "rest.png", "press.mp4", "run.npz")
@@ -91,8 +89,8 @@ def reconstruct(
 
 
 def recover_run(
-    layout: LayoutLike | AnyLayout, output: str | Path, of: Literal["track", "reconstruct"] = "track"
-) -> RecoverDocument:
+    layout: AnyLayout, output: str | Path, of: Literal["track", "reconstruct"] = "track"
+) -> documents.runs.RecoverDocument:
     """Complete the table or recording of a run that was killed, as the commands' ``--recover`` does.
 
     Args:
@@ -105,7 +103,6 @@ def recover_run(
         OutputError: the file cannot be written.
     """
     from cmpdesign.api.layouts import reference_from
-    from cmpdesign.documents.runs import RecoverDocument
     from cmpdesign.tracking.sinks.tables import recover_table
 
     pattern = reference_from(layout)
@@ -113,16 +110,11 @@ def recover_run(
     if of == "reconstruct":
         rows += len(pattern.edges) * pattern.virtual_per_edge
     found = recover_table(Path(output), rows)
-    return RecoverDocument(
-        written=str(output) if found.frames else None, frames=found.frames, problems=tuple(found.problems)
-    )
+    return documents.runs.RecoverDocument.of(found, written=str(output) if found.frames else None)
 
 
 def track_job(
-    layout: LayoutLike | AnyLayout,
-    source: AnySource,
-    output: str | Path,
-    **options: Unpack[TrackOptions],
+    layout: AnyLayout, source: AnySource, output: str | Path, **options: Unpack[TrackOptions]
 ) -> TrackJob:
     """The work of ``track``, with all options."""
     from cmpdesign.api.layouts import reference_from
@@ -133,7 +125,7 @@ def track_job(
 
 
 def reconstruct_job(
-    layout: LayoutLike | AnyLayout,
+    layout: AnyLayout,
     rig: str | Path,
     rest: str | Path | int | Sequence[str | Path],
     source: str | Path | int | Sequence[str | Path | int],
@@ -146,7 +138,9 @@ def reconstruct_job(
 
     chosen = settled(ShapeOptions, options)
     pattern = reference_from(layout)
-    return ReconstructJob(pattern, Path(rig), _list_text(rest), _list_text(source), Path(output), chosen)
+    return ReconstructJob(
+        pattern, Path(rig), ",".join(_texts(rest)), ",".join(_texts(source)), Path(output), chosen
+    )
 
 
 def open_source(
@@ -183,7 +177,7 @@ def open_source(
     return sources.open_source(_texts(source), how)
 
 
-def cameras() -> CamerasDocument:
+def cameras() -> documents.runs.CamerasDocument:
     """List the cameras: formats, sizes and rates, and the ranges of exposure, gain, white balance and focus.
 
     >>> [camera.name for camera in cmpdesign.cameras().cameras]
@@ -193,31 +187,14 @@ def cameras() -> CamerasDocument:
     """
     from dataclasses import asdict
 
-    from cmpdesign.documents.runs import CamerasDocument, ListedCameraPart
     from cmpdesign.inputs.cameras import list_cameras
 
     found = [asdict(camera) for camera in list_cameras()]
-    return CamerasDocument(
-        cameras=tuple(ListedCameraPart(**(camera.pop("offer") | camera)) for camera in found)
+    return documents.runs.CamerasDocument(
+        cameras=tuple(documents.runs.ListedCameraPart(**(camera.pop("offer") | camera)) for camera in found)
     )
 
 
-def load_run(path: str | Path) -> Run:
-    """Read an .npz file of ``track`` or ``reconstruct``.
-
-    Raises:
-        CmpDesignError: the file cannot be read, is no file of these commands, or holds no frame.
-    """
-    from cmpdesign.tracking.export.runs import read_run
-
-    return read_run(Path(path))
-
-
-def _texts(source: AnySource) -> tuple[str, ...]:
+def _texts(source: str | Path | int | Sequence[str | Path | int]) -> tuple[str, ...]:
     """The texts of one source or of several, as the sources' functions take them."""
     return (str(source),) if isinstance(source, str | Path | int) else tuple(map(str, source))
-
-
-def _list_text(value: str | Path | int | Sequence[str | Path | int]) -> str:
-    """One name, or names with commas, as the sources' functions take them."""
-    return str(value) if isinstance(value, str | Path | int) else ",".join(map(str, value))

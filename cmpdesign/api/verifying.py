@@ -9,108 +9,34 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
+from cmpdesign import documents
 from cmpdesign.errors import InputError, parameter
 from cmpdesign.files.atomic import write_file
 from cmpdesign.inputs.files import MAX_PIXELS, require_suffix
-from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written
+from cmpdesign.inputs.options import Channels, Preset, Response, Usual, Written, settled
 from cmpdesign.inputs.texts import one_line, visible
-from cmpdesign.watch import tell, told
+from cmpdesign.watch import notice, tell, told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cmpdesign.documents.reading import VerifyDocument
-    from cmpdesign.layout.layout import Layout as AnyLayout
+    from cmpdesign.api.layouts import AnyLayout
     from cmpdesign.products.sheet.verdict import SheetVerdict
     from cmpdesign.reading.problem_report import ProblemReport
     from cmpdesign.reading.verify import Verdict
     from cmpdesign.tracking.source_images import SourceImage
-    from extractor import Extractor, LayoutLike, Reference
+    from extractor import Extractor, Reference
 
     OneImage = str | Path | NDArray[Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Verifier:
-    """Gives verdicts on pictures of one pattern, or of the pads of a family; the reader is made once.
-
-    Attributes:
-        layouts: the layout, or the layouts of a family, see ``extractor.Extractor``.
-        min_share: share of the visible markers that must be measured, 0 to 1.
-        response: relation of light and values, see ``extractor.Extractor``.
-        channels: "bgr" or "rgb", the order of a picture's colors.
-        sheet_dpi: the pictures are print sheets of this resolution, instead of the files' own; 0: unknown; None:
-            pictures that show the code of a print sheet are judged as such.
-        max_pixels: largest picture that is read from a file, width x height.
-        preset: see ``extractor.Extractor``.
-    """
-
-    layouts: Reference | Sequence[Reference]
-    min_share: float = 0.9
-    response: Response | None = None
-    channels: Channels = "bgr"
-    sheet_dpi: float | None = None
-    max_pixels: int = MAX_PIXELS
-    preset: Preset = "balanced"
-
-    @property
-    def family(self) -> Sequence[Reference]:
-        """The layouts."""
-        return self.layouts if isinstance(self.layouts, Sequence) else (self.layouts,)
-
-    @property
-    def reference(self) -> Reference:
-        """The layout; of a family, the first one."""
-        return self.family[0]
-
-    @cached_property
-    def extractor(self) -> Extractor:
-        """The reader; made for the first picture."""
-        from extractor import Extractor
-
-        return Extractor(self.layouts, self.preset, self.response, "either")
-
-    def read(self, image: str | Path | NDArray[Any]) -> NDArray[Any]:
-        """The picture as (H, W, 3) BGR.
-
-        Raises:
-            ImageFileError: a file or an array that is no color picture.
-        """
-        from cmpdesign.files.images import read_image, require_color_picture
-
-        if isinstance(image, str | Path):
-            pixels: NDArray[Any] = read_image(image, self.max_pixels)
-        else:
-            pixels = require_color_picture(image)
-        return pixels[:, :, ::-1].copy() if self.channels == "rgb" else pixels
-
-    def judge(self, image: NDArray[Any], path: Path | None = None) -> Verdict | SheetVerdict:
-        """The verdict on a picture that ``read`` returns; ``path``: the picture's file, which may state the
-        resolution.
-        """
-        from cmpdesign.products.sheet.verdict import judge_sheet
-        from cmpdesign.reading.verify import verify as judge_pattern
-
-        sheet = judge_sheet(image, path, [one.digest for one in self.family], self.sheet_dpi)
-        if sheet.is_sheet or self.sheet_dpi is not None:
-            return sheet
-        return judge_pattern(self.extractor, image, self.min_share)
-
-    def verify(self, image: str | Path | NDArray[Any]) -> Verdict | SheetVerdict:
-        """Read and judge a picture: a file, or (H, W, 3) uint8 or uint16.
-
-        Raises:
-            ImageFileError: a file or an array that is no color picture.
-        """
-        return self.judge(self.read(image), Path(image) if isinstance(image, str | Path) else None)
-
-
 class VerifyOptions(TypedDict, total=False):
-    """Options of ``verify``: the attributes of ``Verifier``.
+    """Options of ``verify`` and ``Verifier``.
 
     Keys:
         min_share: share of the visible markers that must be measured.
-        sheet_dpi: the pictures are print sheets of this resolution (0: unknown); the files' own resolution is ignored.
+        sheet_dpi: the pictures are print sheets of this resolution (0: unknown); the files' own resolution is ignored;
+            None: pictures that show the code of a print sheet are judged as such.
         preset, response, channels, max_pixels: see ``SequenceOptions``.
     """
 
@@ -122,8 +48,68 @@ class VerifyOptions(TypedDict, total=False):
     max_pixels: Annotated[int, Usual(MAX_PIXELS, metavar="COUNT", least=256)]
 
 
+class Verifier:
+    """Gives verdicts on pictures of one pattern, or of the pads of a family; the reader is made once.
+
+    Attributes:
+        family: the layouts, see ``extractor.Extractor``.
+        options: all options, see ``VerifyOptions``.
+    """
+
+    def __init__(self, layouts: Reference | Sequence[Reference], **options: Unpack[VerifyOptions]) -> None:
+        self.family = tuple(layouts) if isinstance(layouts, Sequence) else (layouts,)
+        self.options = settled(VerifyOptions, options)
+
+    @property
+    def reference(self) -> Reference:
+        """The layout; of a family, the first one."""
+        return self.family[0]
+
+    @cached_property
+    def extractor(self) -> Extractor:
+        """The reader; made for the first picture."""
+        from extractor import Extractor
+
+        return Extractor(self.family, self.options["preset"], self.options["response"], "either")
+
+    def read(self, image: str | Path | NDArray[Any]) -> NDArray[Any]:
+        """The picture as (H, W, 3) BGR.
+
+        Raises:
+            ImageFileError: a file or an array that is no color picture.
+        """
+        from cmpdesign.files.images import read_image, require_color_picture
+
+        if isinstance(image, str | Path):
+            pixels: NDArray[Any] = read_image(image, self.options["max_pixels"])
+        else:
+            pixels = require_color_picture(image)
+        return pixels[:, :, ::-1].copy() if self.options["channels"] == "rgb" else pixels
+
+    def judge(self, image: NDArray[Any], path: Path | None = None) -> Verdict | SheetVerdict:
+        """The verdict on a picture that ``read`` returns; ``path``: the picture's file, which may state the
+        resolution.
+        """
+        from cmpdesign.products.sheet.verdict import judge_sheet
+        from cmpdesign.reading.verify import verify as judge_pattern
+
+        dpi = self.options["sheet_dpi"]
+        sheet = judge_sheet(image, path, [one.digest for one in self.family], dpi)
+        if sheet.is_sheet or dpi is not None:
+            return sheet
+        return judge_pattern(self.extractor, image, self.options["min_share"])
+
+    def verify(self, image: str | Path | NDArray[Any]) -> Verdict | SheetVerdict:
+        """Read and judge a picture: a file, or (H, W, 3) uint8 or uint16.
+
+        Raises:
+            ImageFileError: a file or an array that is no color picture.
+        """
+        return self.judge(self.read(image), Path(image) if isinstance(image, str | Path) else None)
+
+
 def verify(
-    layout: LayoutLike | AnyLayout | Sequence[LayoutLike | AnyLayout],
+    layout: AnyLayout | Sequence[AnyLayout],
     images: OneImage | Sequence[OneImage | int],
     output: Annotated[str | Path | None, Written(metavar="FOLDER")] = None,
     *,
@@ -133,7 +119,7 @@ def verify(
     bits: Annotated[int | None, Written(least=8, most=16)] = None,
     on_verdict: Callable[[str, Verdict | SheetVerdict], None] = lambda name, verdict: None,
     **options: Unpack[VerifyOptions],
-) -> VerifyDocument:
+) -> documents.reading.VerifyDocument:
     """Extract a picture and check the numbering, the colors, the share of measured markers and the side.
 
     >>> verdict = cmpdesign.verify("out/layout.json", "out/sample.png")
@@ -176,7 +162,7 @@ def verify(
         )
     judge = Verifier(layouts_of([reference_from(one) for one in layouts]), **options)
     bundle = None if report is None else _new_report(judge, _layout_text(layouts[0]))
-    files = _Files(judge, _path(output), _path(debug), _path(report), bundle)
+    files = _Files(judge, output, debug, bundle)
     is_one, verdict, parts = isinstance(images, str) or not isinstance(images, Sequence), None, []
     for source in _source_images(judge, [images] if is_one else images, frames, bits):
         if source.image is None and is_one:
@@ -184,10 +170,14 @@ def verify(
         verdict = files.judged(source)
         if verdict is not None:
             on_verdict(visible(source.name), verdict)
+            notice(f"{visible(source.name)}: {verdict.line()}")
         found = _unread(source) if verdict is None else verdict.to_json()
         parts.append({"image": visible(source.name), **found})
     document = _document(judge, parts, verdict if is_one and len(parts) == 1 else None)
-    files.finish(document)
+    if output is not None:
+        write_file(Path(output) / "verify.json", document.to_json())
+    if report is not None and bundle is not None:
+        bundle.write(Path(report))
     return document
 
 
@@ -203,7 +193,7 @@ def _source_images(
     if all(isinstance(image, str | Path | int) for image in images):
         sources = name_sources(map(str, images))
         total = count_images(sources, frames)
-        found = source_images(sources, frames, Reading(max_pixels=judge.max_pixels, bits=bits))
+        found = source_images(sources, frames, Reading(max_pixels=judge.options["max_pixels"], bits=bits))
         yield from found if total is None else told(found, total, "pictures")
         return
     for number, image in enumerate(images, start=1):
@@ -223,13 +213,12 @@ class _Files:
     Attributes:
         judge: the reader.
         output, debug: folders for overlays and for pictures of stages.
-        report: file of ``bundle``, the report of a problem.
+        bundle: the report of a problem, which is not written yet.
     """
 
     judge: Verifier
-    output: Path | None
-    debug: Path | None
-    report: Path | None
+    output: str | Path | None
+    debug: str | Path | None
     bundle: ProblemReport | None
 
     def judged(self, source: SourceImage) -> Verdict | SheetVerdict | None:
@@ -255,34 +244,27 @@ class _Files:
             reference = self.judge.extractor.layout_of(verdict.markers)
             if self.output is not None:
                 overlay = to_png(draw_markers(image, reference, verdict.markers))
-                write_file(self.output / f"{source.stem}.overlay.png", overlay)
+                write_file(Path(self.output) / f"{source.stem}.overlay.png", overlay)
             if self.debug is not None or self.bundle is not None:
                 stages = draw_stages(image, reference, verdict.markers)
         if self.debug is not None:
             for number, (stage, picture) in enumerate(stages.items(), start=1):
-                write_file(self.debug / f"{source.stem}.{number}-{stage}.png", to_png(picture))
+                write_file(Path(self.debug) / f"{source.stem}.{number}-{stage}.png", to_png(picture))
         if self.bundle is not None:
             self.bundle.add(*source.picture(), verdict.to_json(), stages)
 
-    def finish(self, document: VerifyDocument) -> None:
-        """Write verify.json and the report."""
-        if self.output is not None:
-            write_file(self.output / "verify.json", document.to_json())
-        if self.report is not None and self.bundle is not None:
-            self.bundle.write(self.report)
 
-
-def _document(judge: Verifier, images: Sequence[Mapping[str, Any]], found: object) -> VerifyDocument:
-    from cmpdesign.documents.reading import VerifyDocument
-
+def _document(
+    judge: Verifier, images: Sequence[Mapping[str, Any]], found: object
+) -> documents.reading.VerifyDocument:
     codes = [one.code.id for one in judge.family if one.code is not None]
-    return VerifyDocument.of(
+    return documents.reading.VerifyDocument.of(
         found,
         format="cmp-verification",
         version=1,
         pattern=judge.reference.pattern,
         digest=judge.reference.digest,
-        min_share=judge.min_share,
+        min_share=judge.options["min_share"],
         verified=all(image["verified"] for image in images),
         images=images,
         **({"codes": codes} if len(judge.family) > 1 else {}),
@@ -293,25 +275,16 @@ def _new_report(judge: Verifier, layout_text: str) -> ProblemReport:
     """The bundle of pictures, layout and settings, without a picture."""
     from cmpdesign.reading.problem_report import ProblemReport
 
-    settings = {
-        "preset": judge.preset,
-        "response": None if judge.response is None else str(judge.response),
-        "channels": judge.channels,
-        "min_share": judge.min_share,
-    }
+    settings = {name: judge.options[name] for name in ("preset", "response", "channels", "min_share")}
     return ProblemReport(layout_text, settings)
 
 
-def _layout_text(layout: LayoutLike | AnyLayout) -> str:
+def _layout_text(layout: AnyLayout) -> str:
     """The text of a layout file as it is, or as a layout is written."""
     if isinstance(layout, str | Path):
         from cmpdesign.inputs.files import read_text
 
         return read_text(layout)
-    from cmpdesign.api.layouts import layout_from
+    from cmpdesign.api.layouts import read_layout
 
-    return layout_from(layout).to_json()
-
-
-def _path(given: str | Path | None) -> Path | None:
-    return None if given is None else Path(given)
+    return read_layout(layout).to_json()

@@ -32,14 +32,14 @@ class PictureVerdict:
     """One picture.
 
     Attributes:
-        name: the picture's.
+        picture: its name.
         points: their number.
         rms_px: RMS residual, px per axis.
         scale: residuals over the stated deviations; without those, px.
         cause: why the picture contradicts the others and is left out; empty: it is used.
     """
 
-    name: str
+    picture: str
     points: int
     rms_px: float
     scale: float

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
 
-from cmpdesign.cli.mode import Mode, current_mode, use_mode
-from cmpdesign.cli.options.output import NAMES, output_parameters
 from cmpdesign.cli.terminal import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
+    Mode,
+    current_mode,
     is_expected,
     print_error,
     print_origin,
+    use_mode,
 )
 from cmpdesign.errors import CmpDesignError, spelled
 from cmpdesign.inputs.texts import shortened, visible
@@ -34,40 +35,71 @@ PURPOSES = {
     "For other programs": "schema",
 }
 _ARGUMENT_TYPE = re.compile(r"^(  [A-Z]+)( <[^>]+>)", re.MULTILINE)
-_OUTPUT_PARAMETERS = output_parameters()
+
+
+_carrier = typer.Typer(add_completion=False)
+
+
+@_carrier.command()
+def _carry(
+    as_json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            help="Print one JSON document in place of text, and errors and warnings as JSON lines on stderr.",
+        ),
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print errors and warnings only; no progress.")
+    ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose",
+            "-v",
+            help="Also print each step with its time, and the place in the code where an error arose.",
+        ),
+    ] = False,
+) -> None:
+    """Carries the options of every command, in the order of ``Mode``."""
+
+
+OUTPUT_OPTIONS = [each for each in get_command(_carrier).params if each.name in Mode._fields]
 
 
 def examples(*lines: str) -> str:
-    """The end of a command's help text: its examples, one line each, without the prompt."""
-    return "\n".join(lines)
+    """The end of a help text: two examples, without the prompt; of a single one, the second prints the document."""
+    return "\n".join(lines if len(lines) > 1 else (*lines, f"{lines[0]} --json"))
 
 
-def _write_examples(epilog: str | None, formatter: Any) -> None:
-    """One line an example, unwrapped, so that it can be copied."""
-    if epilog:
-        with formatter.section("Examples"):
-            for line in epilog.splitlines():
-                formatter.write(f"{'':{formatter.current_indent}}$ {line}\n")
+class _WithExamples:
+    """A command or group whose help text ends with examples."""
+
+    epilog: str | None
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """One line an example, unwrapped, so that it can be copied."""
+        if self.epilog:
+            with formatter.section("Examples"):
+                for line in self.epilog.splitlines():
+                    formatter.write(f"{'':{formatter.current_indent}}$ {line}\n")
 
 
-class Command(TyperCommand):
+class Command(_WithExamples, TyperCommand):
     """A command with ``--json``, ``--quiet`` and ``--verbose``, which its function does not receive.
 
     It refuses "-" for a file or folder: no command reads standard input or writes files to output.
     """
 
     def __init__(self, name: str | None, *, params: list[Any] | None = None, **options: Any) -> None:
-        super().__init__(name, params=[*(params or []), *_OUTPUT_PARAMETERS], **options)
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        _write_examples(self.epilog, formatter)
+        super().__init__(name, params=[*(params or []), *OUTPUT_OPTIONS], **options)
 
     def get_help(self, ctx: Any) -> str:
         """The help text without Python's types of arguments, as in "SOURCE <list[str]>"."""
         return _ARGUMENT_TYPE.sub(lambda found: found[1] + " " * len(found[2]), super().get_help(ctx))
 
     def invoke(self, ctx: Any) -> Any:
-        mode = Mode(*(ctx.params.pop(name) for name in NAMES))
+        mode = Mode(*(ctx.params.pop(name) for name in Mode._fields))
         excluded = mode.quiet and mode.verbose
         use_mode(mode._replace(verbose=mode.verbose and not excluded))
         if excluded:
@@ -94,11 +126,8 @@ class Command(TyperCommand):
         return option if value is None else f"{option} {value}"
 
 
-class Group(TyperGroup):
-    """A group of commands, whose help text ends with examples."""
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        _write_examples(self.epilog, formatter)
+class Group(_WithExamples, TyperGroup):
+    """A group of commands."""
 
 
 def new_group(help_text: str, *shown: str) -> typer.Typer:
@@ -174,7 +203,14 @@ def _finish_usage_error(error: Exception) -> None:
     error.format_message = lambda: text
 
 
-def exit_interrupted() -> None:
-    """End the program after Ctrl-C outside of commands."""
-    print_error(INTERRUPTED, EXIT_INTERRUPTED)
-    sys.exit(EXIT_INTERRUPTED)
+app = typer.Typer(
+    cls=OneLineErrors,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # markup would remove text in brackets from a help text
+    help="Design, make and read multicolor continuous marker patterns for vision-based tactile sensors.\n\n"
+    "Exit codes: 0 done; 1 done, with a negative verdict or an early end; 2 bad input, or a file that cannot be "
+    "written; 130 stopped by Ctrl-C.",
+    epilog=examples("cmpdesign build tac3d -o mine", "cmpdesign verify --help"),
+)

@@ -14,20 +14,18 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, TypeVar, Union, Unpack, get_args, get_origin
+from typing import Annotated, Any, Union, Unpack, get_args, get_origin
 
 import typer
 
-from cmpdesign.cli.options.completions import COMPLETIONS
-from cmpdesign.cli.options.texts import parse_pairs, parse_pixels, parse_reading_response
+from cmpdesign.cli.command import Command, examples
+from cmpdesign.cli.options import COMPLETIONS, parse_pairs, parse_response
 from cmpdesign.cli.progress import working
-from cmpdesign.cli.terminal import finish
-from cmpdesign.inputs.options import Response, Usual, Written, options_of
-from cmpdesign.tracking.jobs.options import SequenceOptions
-from cmpdesign.watch import watched
+from cmpdesign.cli.terminal import finish, print_written
+from cmpdesign.inputs.options import Response, Usual, Written, options_of, pixels_of
+from cmpdesign.tracking.jobs.options import ReadingOptions, SequenceOptions
 
 Run = Callable[..., Any]
-Takes = TypeVar("Takes", bound=Run)
 Parse = Callable[[Any], Any]
 LAYOUT = "the pattern's layout.json"
 _ENTRY = re.compile(r"^    (?:    )?(\w+(?:, \w+)*): (.*(?:\n {8,}\S.*)*)", re.MULTILINE)
@@ -56,47 +54,65 @@ class _Taken:
     is_key: bool = False
 
 
-def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Callable[[Takes], Run]:
-    """Give a command the parameters of a call.
+def command(
+    group: typer.Typer, call: Callable[..., Any], doing: str, *shown: str, **how: Any
+) -> Callable[[Run], Run]:
+    """Add a command to a group.
 
     Args:
-        call: the call, whose docstring describes parameters and the command.
-        doing: what the call does, for the progress; empty: the command's function calls it.
+        group: the group.
+        call, doing, how: see ``derived``.
+        shown: the command's examples.
+    """
+
+    def decorated(run: Run) -> Run:
+        group.command(cls=Command, epilog=examples(*shown))(derived(call, doing, **how)(run))
+        return run
+
+    return decorated
+
+
+def derived(
+    call: Callable[..., Any], doing: str, calling: Run | None = None, **arguments: Any
+) -> Callable[[Run], Run]:
+    """Give a command the parameters of a call, whose docstring describes parameters and the command.
+
+    Args:
+        call: the call.
+        doing: what the call does, for the progress.
+        calling: called in place of the call; its keyword-only parameters are further options, flags last.
         arguments: parameter of the call -> another help text; None: the command does not have the parameter.
 
-    With ``doing``, the call's record goes to the command's function, which prints the record for people and may return
-    an exit code; with ``--json`` the record is printed. Without it, the function receives all values as keywords. The
-    function's own keyword-only parameters are further options, flags last. Its docstring follows the first sentence of
-    the call's.
+    The call's record goes to the command's function, which prints the record for people and may return an exit code;
+    a parameter ``given`` of the function gets the values of the call. With ``--json`` the record is printed. The
+    docstring of the function follows the first sentence of the call's.
     """
     left_out = {name for name, words in arguments.items() if words is None}
     taken = [each for each in _taken(call) if each.name not in left_out]
     taken.sort(key=lambda each: 0 if each.is_argument else 1 if each.name == "output" else 2)
     meanings = _meanings(call) | {name: words for name, words in arguments.items() if words is not None}
 
-    def decorated(run: Takes) -> Run:
+    def decorated(run: Run) -> Run:
+        own = {} if calling is None else inspect.signature(calling).parameters
         extra = [
-            each.replace(annotation=_evaluated(each.annotation, run.__globals__))
-            for each in inspect.signature(run).parameters.values()
+            each.replace(annotation=_evaluated(each.annotation, getattr(calling, "__globals__", {})))
+            for each in own.values()
             if each.kind is each.KEYWORD_ONLY
         ]
-        parsers = {each.name: _parser(each) for each in taken}
+        parsers = {each.name: _form(each)[1] for each in taken}
         keys = {each.name for each in taken if each.is_key}
+        takes_given = "given" in inspect.signature(run).parameters
 
         def command(ctx: typer.Context, **values: Any) -> None:
             values = {
                 name: parsers[name](each) if name in parsers else each
                 for name, each in values.items()
-                if name not in keys or _is_given(ctx, name)
+                if name not in keys or getattr(ctx.get_parameter_source(name), "name", "") == "COMMANDLINE"
             }
-            if not doing:
-                run(**values)
-                return
-            own = {each.name: values.pop(each.name) for each in extra}
-            with working(doing) as steps, watched(steps.tell):
-                done = call(**values)
-            exit_code = run(done, **own) or 0
-            finish(lambda: done, exit_code)
+            with working(doing):
+                done = (calling or call)(**values)
+            print_written(done)
+            finish(done, (run(done, given=values) if takes_given else run(done)) or 0)
 
         of_call = [_parameter(each, meanings) for each in taken]
         placed = sum(each.is_argument for each in taken) + any(each.name == "output" for each in taken)
@@ -110,11 +126,6 @@ def derived(call: Callable[..., Any], doing: str = "", **arguments: Any) -> Call
         return command
 
     return decorated
-
-
-def _is_given(ctx: typer.Context, name: str) -> bool:
-    source = ctx.get_parameter_source(name)
-    return source is not None and source.name == "COMMANDLINE"
 
 
 class _Names(dict[str, Any]):
@@ -162,7 +173,7 @@ def _taken(call: Callable[..., Any]) -> Iterator[_Taken]:
 def _meanings(described: Any) -> dict[str, str]:
     """Name -> meaning of every argument or key in a docstring and in the docstrings that it names."""
     found: dict[str, str] = {}
-    of_records = dict(_meanings(SequenceOptions)) if described is not SequenceOptions else {}
+    of_records = {} if described in (SequenceOptions, ReadingOptions) else dict(_meanings(SequenceOptions))
     names = getattr(described, "__globals__", None) or vars(inspect.getmodule(described))
     for entry, text in _ENTRY.findall(inspect.getdoc(described) or ""):
         meaning = " ".join(text.split())
@@ -194,7 +205,7 @@ def _help(text: str) -> str:
 
 def _parameter(taken: _Taken, meanings: Mapping[str, str]) -> inspect.Parameter:
     """The parameter as typer reads it."""
-    name, written, kind = taken.name, taken.written, _written_type(taken)
+    name, written, kind = taken.name, taken.written, _form(taken)[0]
     meaning = meanings[name].partition("; None: ")[0] if written.needed else meanings[name]
     words: dict[str, Any] = {"help": _help(meaning), "metavar": written.metavar}
     words["autocompletion"] = COMPLETIONS.get(name)
@@ -221,56 +232,38 @@ def _parameter(taken: _Taken, meanings: Mapping[str, str]) -> inspect.Parameter:
 
 def _members(kind: Any) -> list[Any]:
     """The types of a union, without None."""
-    return [each for each in (get_args(kind) if _is_union(kind) else [kind]) if each is not NoneType]
+    kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+    return [each for each in kinds if each is not NoneType]
 
 
-def _is_union(kind: Any) -> bool:
-    return get_origin(kind) in (Union, UnionType)
-
-
-def _is_pixels(kind: Any) -> bool:
-    return any(get_origin(each) is tuple for each in _members(kind))
-
-
-def _written_type(taken: _Taken) -> Any:
-    """The type that the command line parses: texts for responses, and for what may be a number or a path."""
-    members = _members(taken.kind)
-    is_absent = taken.default is None
-    if taken.written.with_commas:
-        return str
-    several = [each for each in members if get_origin(each) in (Sequence, list) or _is_mapping(each)]
+def _form(taken: _Taken) -> tuple[Any, Parse]:
+    """The type that the command line parses, and the way from its value to what the call takes."""
+    members, written = _members(taken.kind), taken.written
+    option = written.name or f"--{taken.name.replace('_', '-')}"
+    several = [each for each in members if get_origin(each) in (Sequence, list, Mapping)]
+    sizes = [each for each in members if get_origin(each) is tuple]
+    if written.with_commas:
+        return str, _same
+    if several and get_origin(several[0]) is Mapping:
+        key = get_args(several[0])[0]
+        return list[str], lambda texts: parse_pairs(option, texts or [], key, written)
     if several:
         # one or several sources are texts, as patterns and numbers of cameras; a list of files are paths
-        is_of_files = (
-            len(members) == 1 and not _is_mapping(several[0]) and Path in _members(get_args(several[0])[0])
-        )
-        return list[Path] if is_of_files else list[str]
-    if set(members) == set(get_args(Response)) or _is_pixels(taken.kind) or {str, int} <= set(members):
-        kind: Any = str
+        is_of_files = len(members) == 1 and Path in _members(get_args(several[0])[0])
+        return list[Path] if is_of_files else list[str], lambda values: values or taken.default
+    kind: Any = members[0]
+    parse: Parse = _same
+    if set(members) == set(get_args(Response)):
+        kind, parse = str, parse_response
+    elif str in members and (sizes or {int, float} & set(members)):
+        kind = str
+    elif sizes:
+        most = int(written.most or 99_999)
+        kind, parse = str, lambda text: None if text is None else pixels_of(taken.name, text, most)
     elif Path in members or _PythonOnly in members:
         kind = Path
-    else:
-        assert len(members) == 1, taken
-        (kind,) = members
-    return Union[kind, None] if is_absent else kind  # noqa: UP007
+    return Union[kind, None] if taken.default is None else kind, parse  # noqa: UP007
 
 
-def _is_mapping(kind: Any) -> bool:
-    return get_origin(kind) is Mapping
-
-
-def _parser(taken: _Taken) -> Parse:
-    """From what typer gives to what the call takes."""
-    members, option = _members(taken.kind), taken.written.name or f"--{taken.name.replace('_', '-')}"
-    if set(members) == set(get_args(Response)):
-        return parse_reading_response
-    if _is_pixels(taken.kind):
-        most = int(taken.written.most or 99_999)
-        return lambda text: None if text is None else parse_pixels(option, text, most)
-    for each in members:
-        if _is_mapping(each):
-            key = get_args(each)[0]
-            return lambda texts: parse_pairs(option, texts or [], key, taken.written)
-    if get_origin(members[0]) is Sequence and taken.default == ():
-        return lambda values: values or ()
-    return lambda value: value
+def _same(value: Any) -> Any:
+    return value

@@ -2,46 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from cmpdesign.cli.mode import current_mode
-from cmpdesign.cli.terminal import console, print_step
+from cmpdesign.cli.terminal import console, current_mode, print_step, print_warning, say_text
 from cmpdesign.inputs.texts import visible
+from cmpdesign.watch import watched
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
 # Rates are means over this time; a trial of an experiment takes up to a minute.
 SPEED_PERIOD_S = 300.0
-Advance = Callable[[str], None]
-
-
-@contextmanager
-def progress_bar(doing: str, total: int | None, *, done: int = 0, unit: str = "") -> Iterator[Advance]:
-    """A progress bar that is removed at its end.
-
-    Args:
-        doing: text before the bar.
-        total: number of steps; None: unknown.
-        done: number of steps that an earlier run has done.
-        unit: of a step, for the rate, as in "frames".
-
-    Yields:
-        The function to call after every step, with a note that stands behind the bar.
-    """
-    with _progress() as progress:
-        if progress is None:
-            yield lambda note: None
-            return
-        task = progress.add_task(visible(doing), total=total, completed=done, note="", rate="")
-
-        def advance(note: str) -> None:
-            progress.advance(task)
-            progress.update(task, note=visible(note), rate=_rate(progress, unit, done))
-
-        yield advance
 
 
 class Steps:
@@ -56,7 +29,18 @@ class Steps:
             self._progress.refresh()
             for task in self._progress.task_ids:
                 self._progress.remove_task(task)
-            self._progress.add_task(visible(doing), total=None, note="", rate="")
+            self._progress.add_task(visible(doing), total=None, rate="")
+
+    def notice(self, text: str, is_doubt: bool) -> None:
+        """Print a line above the bars: a warning on standard error, another line on standard output."""
+        if self._progress is not None:  # the bars redirect standard output
+            self._progress.stop()
+        if is_doubt:
+            print_warning(text)
+        else:
+            say_text(f"{text}\n")
+        if self._progress is not None:
+            self._progress.start()
 
     def tell(self, done: int, total: int | None, unit: str) -> None:
         """Show how many of the step's parts are done, or the next step; see ``cmpdesign.watch``."""
@@ -65,25 +49,30 @@ class Steps:
             self.begin(unit)
         elif self._progress is not None and self._progress.task_ids:
             task = self._progress.task_ids[-1]
-            self._progress.update(task, completed=done, total=total)
+            self._progress.update(task, completed=done, total=total or None)
             self._progress.update(task, rate=_rate(self._progress, unit))
 
 
 @contextmanager
-def working(doing: str) -> Iterator[Steps]:
-    """Progress of work in steps; the bars are removed at the end. The first step is ``doing``."""
+def working(doing: str) -> Iterator[None]:
+    """Show the progress of the work within this context, by ``cmpdesign.watch``; the bars are removed at the end.
+
+    Args:
+        doing: the first step.
+    """
     with _progress() as progress:
         steps = Steps(progress)
         steps.begin(doing)
-        yield steps
+        with watched(steps.tell, steps.notice):
+            yield
 
 
-def _rate(progress: Progress, unit: str, before: int = 0) -> str:
-    """The rate of the last task, of which an earlier run did ``before`` parts; Rich has no rate for the first part."""
+def _rate(progress: Progress, unit: str) -> str:
+    """The rate of the last task; Rich has no rate for the first part."""
     task = progress.tasks[-1]
     speed = task.finished_speed or task.speed
     if speed is None and task.elapsed:
-        speed = (task.completed - before) / task.elapsed
+        speed = task.completed / task.elapsed
     return "" if speed is None else f"{speed:.3g} {unit}/s"
 
 
@@ -111,7 +100,6 @@ def _progress() -> Iterator[Progress | None]:
         TimeElapsedColumn(),
         TextColumn("remaining"),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}", markup=False),
     )
     with Progress(
         *columns, console=terminal, transient=True, speed_estimate_period=SPEED_PERIOD_S

@@ -12,14 +12,14 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import typer
 
-from cmpdesign.cli.mode import current_mode
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.inputs.texts import one_line, shortened, visible
 
@@ -28,9 +28,43 @@ if TYPE_CHECKING:
 
     from cmpdesign.documents.document import Document
 
+EXIT_NEGATIVE = 1  # done, with a negative verdict or an early end
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _STARTED = time.perf_counter()
+
+
+class Mode(NamedTuple):
+    """The options that every command has.
+
+    Attributes:
+        as_json: one JSON document on stdout, errors and warnings as JSON lines on stderr.
+        quiet: errors and warnings only.
+        verbose: each step with its time on stderr, and the place in the code where an error arose.
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+
+    @property
+    def prints_text(self) -> bool:
+        """Results and progress are printed for people."""
+        return not (self.as_json or self.quiet)
+
+
+_TEXT = Mode()
+_MODE: ContextVar[Mode] = ContextVar("mode", default=_TEXT)
+
+
+def current_mode() -> Mode:
+    """The mode of the running command."""
+    return _MODE.get()
+
+
+def use_mode(mode: Mode) -> None:
+    """Set the mode of the running command."""
+    _MODE.set(mode)
 
 
 def console(stderr: bool = False) -> Console:
@@ -101,13 +135,8 @@ def say(*objects: Any, **options: Any) -> None:
 
 
 def say_table(rows: Mapping[str, str]) -> None:
-    """Print names and their values for people, as a table."""
-    from rich.table import Table
-
-    table = Table(box=None, show_header=False, pad_edge=False)
-    for name, value in rows.items():
-        table.add_row(name, value)
-    say(table)
+    """Print names and their values for people."""
+    say_columns(("", ""), rows.items(), folds=True)
 
 
 def say_columns(headings: Sequence[str], rows: Iterable[Sequence[str]], *, folds: bool = False) -> None:
@@ -120,7 +149,7 @@ def say_columns(headings: Sequence[str], rows: Iterable[Sequence[str]], *, folds
     """
     from rich.table import Table
 
-    table = Table(box=None, pad_edge=False)
+    table = Table(box=None, show_header=any(headings), pad_edge=False)
     for heading in headings:
         justify: Literal["left", "right"] = "right" if heading.startswith(">") else "left"
         table.add_column(heading.removeprefix(">"), justify=justify, overflow="fold" if folds else "ellipsis")
@@ -167,23 +196,21 @@ def discard_output() -> None:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
-def finish(make_document: Callable[[], Document], exit_code: int = 0) -> None:
-    """End a command: print its document with ``--json``, and exit with its code.
+def print_written(done: object) -> None:
+    """Print the written files or folders of a record for people."""
+    written = getattr(done, "written", None) or ()
+    for path in (written,) if isinstance(written, str) else written:
+        say(f"wrote {path}")
 
-    Args:
-        make_document: makes the document; called with ``--json`` only.
-        exit_code: the command's exit code.
+
+def finish(done: Document, exit_code: int = 0) -> None:
+    """End a command: print its document with ``--json``, and exit with its code.
 
     Raises:
         typer.Exit: the exit code is not 0.
     """
     if current_mode().as_json:
-        print_document(make_document().to_json())
+        print_document(done.to_json())
     print_step("done")
     if exit_code:
         raise typer.Exit(exit_code)
-
-
-def printable_path(path: object) -> str:
-    """The path as text, with unprintable characters escaped."""
-    return visible(str(path))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, PlainSerializer, WithJsonSchema
 
 from cmpdesign.documents.document import Document, DocumentPart
+from cmpdesign.inputs.options import Make
 
 
 class FindingPart(DocumentPart):
@@ -61,6 +62,21 @@ class CheckDocument(Document):
     findings: tuple[FindingPart, ...]
 
 
+def _rounded(digits: int) -> PlainSerializer:
+    """A number is rounded in the document, not in the record."""
+    return PlainSerializer(lambda value: round(value, digits))
+
+
+def _given_fields(design: Any) -> dict[str, Any]:
+    """The fields of a design's file, whose name is the design's."""
+    given = design.model_fields_set - {"name"}
+    return {name: getattr(design, name) for name in type(design).model_fields if name in given}
+
+
+_OBJECT: dict[str, Any] = {"additionalProperties": True, "type": "object"}
+Length = Annotated[float, _rounded(4)]
+
+
 class SizeDocument(Document):
     """The design that ``size`` proposes, and the error that is predicted for it."""
 
@@ -68,17 +84,21 @@ class SizeDocument(Document):
     version: Literal[1] = 1
     camera_px: tuple[int, int] = Field(description="Width and height of the camera's picture.")
     view_mm: tuple[float, float] = Field(description="Width and height of the field of view.")
-    scale_px_per_mm: float
-    design: dict[str, Any] = Field(description="The fields of a design file.")
+    scale_px_per_mm: Length
+    design: Annotated[Any, PlainSerializer(_given_fields), WithJsonSchema(_OBJECT)] = Field(
+        description="The fields of a design file."
+    )
     markers: int
-    pitch_px: float
-    error_px: float = Field(description="Predicted error per marker and axis, of inner markers.")
-    error_um: float
-    rim_error_um: float
-    told_apart_mm: float = Field(description="Smallest distance at which two touches can be told apart.")
+    pitch_px: Annotated[float, _rounded(3)]
+    error_px: Annotated[float, _rounded(5)] = Field(
+        description="Predicted error per marker and axis, of inner markers."
+    )
+    error_um: Length
+    rim_error_um: Length
+    told_apart_mm: Length = Field(description="Smallest distance at which two touches can be told apart.")
     limit: str = Field(description="Limit that a finer pattern would exceed.")
-    seen_mm: tuple[float, float] = Field(description="Width and height of what all pixels see.")
-    make: Literal["laser", "mold", "print"] | None = Field(description="Product that makes the pad.")
+    seen_mm: tuple[Length, Length] = Field(description="Width and height of what all pixels see.")
+    make: Make | None = Field(description="Product that makes the pad.")
     next_command: str = Field(description="The command that makes the design's files.")
 
 

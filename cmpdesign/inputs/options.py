@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from cmpdesign.errors import CmpDesignError, parameter
+from cmpdesign.errors import CmpDesignError, InputError, parameter
 
 # As in the extractor, which these modules do not load; a test compares both.
 Preset = Literal["balanced", "accurate"]
 Side = Literal["designed", "front", "back", "either"]
 Channels = Literal["bgr", "rgb"]
+Make = Literal["laser", "mold", "print"]
 Response = Literal["srgb", "linear"] | float
 Options = TypeVar("Options")
+_SIZE = re.compile(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", re.ASCII)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +63,24 @@ class Option:
     name: str
     type: Any
     usual: Usual
+
+
+def pixels_of(name: str, given: str | Sequence[int], most: int = 99_999) -> tuple[int, int]:
+    """Width and height in px from a text as "640x480" or "640 X 480", or from two whole numbers.
+
+    Args:
+        name: the call's parameter, for the message.
+        given: its value.
+        most: largest width and height.
+
+    Raises:
+        InputError: another value, or a side that is not from 10 to ``most``.
+    """
+    found = _SIZE.fullmatch(given) if isinstance(given, str) else None
+    sides = tuple(map(int, found.groups())) if found else given
+    if len(sides) == 2 and all(isinstance(side, int) and 10 <= side <= most for side in sides):
+        return int(sides[0]), int(sides[1])
+    raise InputError(f"{parameter(name)} {given}: expected WIDTHxHEIGHT, 10 to {most} px each, as in 640x480")
 
 
 def options_of(record: type) -> list[Option]:

@@ -58,6 +58,20 @@ class DesignReport:
     code: CodeFigures | None
     findings: tuple[Finding, ...]
 
+    def figures(self) -> dict[str, str]:
+        """The key figures, in words."""
+        cells = ", ".join(f"{count} {color}" for color, count in self.cells.items() if count)
+        absent = self.markers - self.present_markers
+        rows = {
+            "pattern": f"{self.pattern}, {self.layers} layers, pitch {self.pitch_mm:.4g} mm",
+            "markers": f"{self.present_markers}" + (f" ({absent} more ids are never seen)" if absent else ""),
+            "virtual markers": f"{self.virtual_markers} on {self.edges} edges ({self.points} points)",
+            "cells": f"{sum(self.cells.values())}: {cells}",
+            "overall size": "{:.2f} x {:.2f} mm, border included".format(*self.size_mm),
+            "smallest feature": f"{self.smallest_feature_mm:.3f} mm (circle inside the narrowest cell)",
+        }
+        return rows if self.code is None else {**rows, "code": self.code.line()}
+
 
 def design_report(design: Design, layout: Layout, camera_px: tuple[int, int] = CAMERA_PX) -> DesignReport:
     """The key figures of a design and its layout; ``camera_px`` as in ``check_design``.

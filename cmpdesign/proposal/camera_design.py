@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from html import escape
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 from cmpdesign.api.designs import Design
-from cmpdesign.errors import CmpDesignError
+from cmpdesign.documents.designs import SizeDocument
+from cmpdesign.errors import CmpDesignError, parameter
+from cmpdesign.inputs.options import Make, pixels_of
 from cmpdesign.layout.checks import CELL_WARNING_MM, EDGE_WARNING_PX
 from cmpdesign.patterns.graphs import MAX_LAYERS
 from cmpdesign.products.registry import USUAL_NAMES, refusal_of
@@ -25,14 +26,12 @@ BORDER_PITCHES = 0.5
 FEWEST_LAYERS = 2
 # Diameter of the circle inside a cell, and the longest period that the markers' lattice does not resolve, in pitches.
 CELL_PITCHES, PERIOD_PITCHES = 1 / math.sqrt(3), math.sqrt(3)
-LARGEST_SIDE_PX, LARGEST_VIEW_MM = 99_999, 10_000.0
+LARGEST_VIEW_MM = 10_000.0
 MAX_BLUR_PX, MAX_NOISE = 10.0, 50.0
 _PITCH_DECIMALS = 4
 _TWO_NUMBERS = r"\s*([0-9.]+)\s*[xX×]\s*([0-9.]+)\s*"
 
 
-Limit = Literal["pixels", "cells", "layers", "error", "make"]
-Make = Literal["laser", "mold", "print"]
 # Products whose pad is seen from behind: inside a sensor the camera looks at the pad's back, through gel or base layer.
 # A print is looked at from its printed side, unless it is stuck to a gel.
 SEEN_FROM_BEHIND: tuple[Make, ...] = ("laser", "mold")
@@ -48,61 +47,17 @@ class Sides(NamedTuple):
         return f"{self.width:g}x{self.height:g}"
 
 
-@dataclass(frozen=True, eq=False)
-class Proposal:
-    """A design for a camera.
-
-    Attributes:
-        design: the design; ``design.write("out")`` makes its files.
-        camera: width and height, px.
-        view: width and height of the field of view in the pattern's plane, mm.
-        scale_px_per_mm: pixels in a millimetre, by the tighter of the two sides.
-        pitch_px: pixels from marker to marker.
-        error: predicted standard deviation per marker and axis, px.
-        limit: limit that a finer pattern would exceed, of ``Limit``; "cells" that can be made, "make" of the product.
-        make: the product that makes the pad; None: not stated.
-        refusal: why the product refuses a finer pattern; empty unless ``limit`` is "make".
-    """
-
-    design: Design
-    camera: Sides
-    view: Sides
-    scale_px_per_mm: float
-    pitch_px: float
-    error: PredictedError
-    limit: Limit
-    make: Make | None = None
-    refusal: str = ""
+class Proposal(SizeDocument):
+    """A design for a camera, with what is predicted for the design; ``design.write("out")`` makes its files."""
 
     @property
-    def seen_mm(self) -> Sides:
-        """Width and height of the field that all pixels see at this scale; one side is larger than the wanted view,
-        where pixels and view differ in shape."""
-        return Sides(self.camera.width / self.scale_px_per_mm, self.camera.height / self.scale_px_per_mm)
-
-    @property
-    def error_um(self) -> float:
-        """Predicted standard deviation of an inner marker, per axis, um on the pattern."""
-        return 1000 * self.error.inner_px / self.scale_px_per_mm
-
-    @property
-    def rim_error_um(self) -> float:
-        """Predicted standard deviation of a marker of the outermost layer, per axis, um on the pattern."""
-        return 1000 * self.error.rim_px / self.scale_px_per_mm
-
-    @property
-    def told_apart_mm(self) -> float:
-        """Smallest distance at which two equal objects are told apart in any direction: a period of sqrt(3) pitches.
-
-        A triangular lattice resolves every longer period, and no shorter period in all directions. The blur by the soft
-        layer between objects and pattern is not included.
-        """
-        assert self.design.pitch_mm is not None
-        return PERIOD_PITCHES * self.design.pitch_mm
+    def refusal(self) -> str:
+        """Why the product refuses a finer pattern; empty unless ``limit`` is "make"."""
+        return str(self.found)
 
     def figures(self) -> dict[str, str]:
         """The key figures, in words."""
-        report, design = self.design.report, self.design
+        design = self.design
         limits = {
             "pixels": f"{EDGE_WARNING_PX:g} px from marker to marker, the fewest that are read at every turn and tilt",
             "cells": f"cells with a circle of {CELL_WARNING_MM:g} mm inside, the smallest that are made well",
@@ -112,39 +67,18 @@ class Proposal:
         }
         side = "back: mirrored = true" if design.mirrored else "front: mirrored = false"
         return {
-            "camera": f"{self.camera} px on {self.view} mm: {self.scale_px_per_mm:.4g} px a mm",
+            "camera": f"{Sides(*self.camera_px)} px on {Sides(*self.view_mm)} mm: {self.scale_px_per_mm:.4g} px a mm",
             "field seen": "{:.4g} x {:.4g} mm".format(*self.seen_mm),
             "made by": self.make or "not stated; with --make laser, mold or print, build accepts the design",
             "side seen": f"the {side}; change this line if your camera sees the other side",
             "pattern": f"{design.pattern}, {design.layers} layers",
             "pitch": f"{design.pitch_mm:g} mm = {self.pitch_px:.3g} px",
-            "markers": f"{report.present_markers}",
-            "overall size": "{:.2f} x {:.2f} mm, border included".format(*report.size_mm),
-            "error per marker": f"{self.error_um:.3g} um per axis ({self.error.inner_px:.4f} px), "
+            "markers": f"{self.markers}",
+            "overall size": "{:.2f} x {:.2f} mm, border included".format(*design.layout.size_mm),
+            "error per marker": f"{self.error_um:.3g} um per axis ({self.error_px:.4f} px), "
             f"{self.rim_error_um:.3g} um in the outermost layer",
             "told apart": f"objects {self.told_apart_mm:.3g} mm from each other, less what the soft layer spreads",
             "limited by": limits[self.limit],
-        }
-
-    def to_json(self) -> dict[str, Any]:
-        """The proposal as a JSON object."""
-        return {
-            "format": "cmp-size",
-            "version": 1,
-            "camera_px": [int(side) for side in self.camera],
-            "view_mm": list(self.view),
-            "scale_px_per_mm": round(self.scale_px_per_mm, 4),
-            "design": self._parameters(),
-            "markers": self.design.report.present_markers,
-            "pitch_px": round(self.pitch_px, 3),
-            "error_px": round(self.error.inner_px, 5),
-            "error_um": round(self.error_um, 4),
-            "rim_error_um": round(self.rim_error_um, 4),
-            "told_apart_mm": round(self.told_apart_mm, 4),
-            "limit": self.limit,
-            "seen_mm": [round(side, 4) for side in self.seen_mm],
-            "make": self.make,
-            "next_command": self.next_command("DESIGN.toml"),
         }
 
     def to_toml(self) -> str:
@@ -153,18 +87,8 @@ class Proposal:
         comments = [
             f"# {name}: {figures[name]}" for name in ("camera", "made by", "error per marker", "told apart")
         ]
-        values = [f"{name} = {json.dumps(value)}" for name, value in self._parameters().items()]
+        values = [f"{name} = {json.dumps(value)}" for name, value in self.model_dump()["design"].items()]
         return "\n".join([*comments, *values]) + "\n"
-
-    def next_command(self, path: str) -> str:
-        """The command that makes the design of a TOML file."""
-        only = f" --only {USUAL_NAMES},{self.make}" if self.make else ""
-        return f"cmpdesign build {path} -o made{only}"
-
-    def _parameters(self) -> dict[str, Any]:
-        return {
-            name: getattr(self.design, name) for name in _PARAMETERS if name in self.design.model_fields_set
-        }
 
     def _repr_html_(self) -> str:
         """The key figures and the pattern, for notebooks."""
@@ -174,50 +98,16 @@ class Proposal:
         return f"<div>{self.design.layout._repr_svg_().partition(chr(10))[2]}<table>{cells}</table></div>"
 
 
-_PARAMETERS = (
-    "description",
-    "source",
-    "pattern",
-    "layers",
-    "pitch_mm",
-    "border_mm",
-    "rotation_deg",
-    "mirrored",
-)
-
-
-def size(
-    camera: str | tuple[float, float],
-    view: str | tuple[float, float],
-    error: str | float | None = None,
-    *,
-    blur_px: float = 1.0,
-    noise: float = 2.0,
-    make: Make | None = None,
+def propose(
+    camera: str | Sequence[int],
+    view: object,
+    error: str | float | None,
+    blur_px: float,
+    noise: float,
+    make: Make | None,
 ) -> Proposal:
-    """Propose pitch and layers for a camera and its field of view, as the command ``size`` does.
-
-    The pattern is the finest that fits the view and is read well: the error per marker grows with finer patterns, the
-    distance at which objects are told apart falls. With ``error``, the pattern is the finest whose markers have this
-    error.
-
-    >>> proposal = cmpdesign.size("1280x960", "24x18mm", "0.2um")
-    >>> proposal.design.write("out")
-
-    Args:
-        camera: pixels, width and height: (1280, 960) or "1280x960".
-        view: width and height of the field of view in the pattern's plane: mm, or a text such as "24x18mm".
-        error: largest standard deviation of an inner marker, per axis: mm, or a text such as "0.2um".
-        blur_px: sigma of the Gaussian blur of optics and pixel together.
-        noise: standard deviation of the camera's noise, in 255ths.
-        make: product that makes the pad, "laser", "mold" or "print": the pattern is one that ``build`` accepts, and
-            ``mirrored`` is the side that is usually seen. None: only the limits of the camera and of cells count.
-
-    Raises:
-        CmpDesignError: a value out of range, an error that the camera cannot reach, with the smallest error, or a view
-            on which the product makes no pattern.
-    """
-    pixels, seen_mm = _pixels(camera), _view_mm(view)
+    """The proposal of ``size``, whose arguments and errors these are."""
+    pixels, seen_mm = Sides(*pixels_of("camera", camera)), _view_mm(view)
     imaging = Imaging(
         _within("blur_px", blur_px, 0.3, MAX_BLUR_PX, "px"),
         _within("noise", noise, 0.1, MAX_NOISE, "of 255"),
@@ -258,8 +148,26 @@ def size(
                 )
     design = design_of(layers)
     assert design.pitch_mm is not None
-    return Proposal(
-        design, pixels, seen_mm, scale, design.pitch_mm * scale, predicted(layers), limit, make, refusal
+    predicted_px, um_per_px = predicted(layers), 1000 / scale
+    only = f" --only {USUAL_NAMES},{make}" if make else ""
+    return Proposal.of(
+        refusal,
+        camera_px=tuple(int(side) for side in pixels),
+        view_mm=seen_mm,
+        scale_px_per_mm=scale,
+        design=design,
+        markers=int(design.layout.present.sum()),
+        pitch_px=design.pitch_mm * scale,
+        error_px=predicted_px.inner_px,
+        error_um=predicted_px.inner_px * um_per_px,
+        rim_error_um=predicted_px.rim_px * um_per_px,
+        # A triangular lattice resolves every longer period, and no shorter period in all directions. The blur by the
+        # soft layer between objects and pattern is not included.
+        told_apart_mm=PERIOD_PITCHES * design.pitch_mm,
+        limit=limit,
+        seen_mm=(pixels.width / scale, pixels.height / scale),
+        make=make,
+        next_command=f"cmpdesign build DESIGN.toml -o made{only}",
     )
 
 
@@ -283,7 +191,7 @@ def _fitting(layers: int, view_mm: Sides) -> _Fit:
     return _Fit(pitch_mm, 0.0 if lying >= standing else 90.0)
 
 
-def _finest_layers(pixels: Sides, view_mm: Sides, scale: float) -> tuple[int, Limit]:
+def _finest_layers(pixels: Sides, view_mm: Sides, scale: float) -> tuple[int, str]:
     """The largest number of layers that are read and made well, and the limit.
 
     Raises:
@@ -329,7 +237,7 @@ def _finest_made(make: Make, finest: int, design_of: Callable[[int], Design]) ->
         said = refusal_of(make, design_of(middle))
         low, high, refusal = (low, middle, said) if said else (middle, high, refusal)
     if low < FEWEST_LAYERS:
-        raise CmpDesignError(f"--make {make}: {FEWEST_LAYERS} layers on this view: {refusal}")
+        raise CmpDesignError(f"{parameter('make', make)}: {FEWEST_LAYERS} layers on this view: {refusal}")
     return low, refusal
 
 
@@ -351,18 +259,6 @@ def _unreachable(error: str | float, pixels: Sides, view_mm: Sides, best_mm: flo
 
 def _shown_um(mm: float) -> str:
     return f"{1000 * mm:.3g} um"
-
-
-def _pixels(camera: object) -> Sides:
-    match = re.fullmatch(_TWO_NUMBERS, camera) if isinstance(camera, str) else None
-    sides = match.groups() if match else camera
-    try:
-        width, height = (int(side) for side in sides)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise CmpDesignError(f"camera {camera}: expected WIDTHxHEIGHT in px, as in 1280x960") from None
-    for side in (width, height):
-        _within("camera", side, 10, LARGEST_SIDE_PX, "px")
-    return Sides(width, height)
 
 
 def _view_mm(view: object) -> Sides:

@@ -62,6 +62,17 @@ class Verdict:
     contradictions: tuple[int, ...]
     markers: Markers
 
+    def line(self) -> str:
+        """The verdict in one line, and a line for each hint on a pattern that was found."""
+        pad = "" if self.markers.code is None else f"pad {self.markers.code}, "
+        repaired = self.repaired + self.fitted
+        counts = f"{pad}{self.measured} of {self.present} measured, {repaired} repaired, {self.lost} lost"
+        head = "verified" if self.verified else f"not verified: {self.reason}"
+        line = f"{head} ({counts}, {sum(self.markers.timings_ms.values()):.1f} ms)"
+        quality = self.markers.quality
+        hints = quality.hints if quality is not None and self.markers.found else ()
+        return "".join([line, *(f"\n  {hint}" for hint in hints if hint not in head)])
+
     def to_json(self) -> dict[str, Any]:
         """The verdict as a JSON object; times in ms."""
         names = (

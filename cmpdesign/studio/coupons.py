@@ -10,11 +10,9 @@ from cmpdesign.api.designs import Design
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.files.images import read_image
 from cmpdesign.products.laser.coupon.design import Coupon, design_coupon
-from cmpdesign.products.laser.coupon.photo import read_coupon
 from cmpdesign.products.laser.coupon.picture import PhotoError
-from cmpdesign.products.laser.coupon.stated_response import stated_response
 from cmpdesign.products.laser.grid.design import design_grid
-from cmpdesign.products.laser.grid.reading import read_grid
+from cmpdesign.products.laser.grid.reading import read_cut
 from cmpdesign.products.laser.setup import complete_setup
 
 
@@ -34,10 +32,7 @@ def coupon_readings(
     image = read_image(file, most_pixels, gray=True)
     for coupon in coupons:
         try:
-            if coupon.kind == "grid":
-                found: Any = read_grid(coupon, image)
-            else:
-                found = read_coupon(coupon, image, stated=stated_response(file))
+            found = read_cut(coupon, file, image)
         except PhotoError:
             continue
         yield coupon, found, (image.shape[1], image.shape[0])

@@ -161,7 +161,7 @@ def proposed_design(asked: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         CmpDesignError: see ``size``.
     """
-    from cmpdesign.proposal.camera_design import size
+    from cmpdesign.proposal.sizing import size
 
     make, error = asked.get("make") or None, str(asked.get("error") or "") or None
     proposal = size(str(asked.get("camera", "")), str(asked.get("view", "")), error, make=make)

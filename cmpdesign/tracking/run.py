@@ -6,6 +6,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from cmpdesign.tracking.live.view import LiveView
 from cmpdesign.tracking.overlay import OverlayWriter
 from cmpdesign.tracking.sinks.tables import FrameSink
 from cmpdesign.tracking.sources import FrameSource, Reading, open_source
+from cmpdesign.watch import tell
 
 if TYPE_CHECKING:
     from extractor import Markers, Tracker
@@ -31,6 +33,9 @@ class StopRequest:
     is_requested: bool = False
 
 
+_STOP: ContextVar[StopRequest | None] = ContextVar("stop", default=None)
+
+
 @dataclass(eq=False)
 class TrackingRun:
     """The parts of one run.
@@ -43,7 +48,7 @@ class TrackingRun:
         overlay: writer of the overlay video, if any.
         limit: largest number of frames, if any.
         ended_early: reason for an early end; "" if all frames were tracked.
-        stop: request to stop.
+        stop: request to stop; that of ``stop_on_signal`` within its context.
         warnings: reasons to doubt the results.
         live: live viewer of the tracked frames, if any; a failure of the viewer does not end the run.
     """
@@ -55,7 +60,7 @@ class TrackingRun:
     overlay: OverlayWriter | None = None
     limit: int | None = None
     ended_early: str = ""
-    stop: StopRequest = field(default_factory=StopRequest)
+    stop: StopRequest = field(default_factory=lambda: _STOP.get() or StopRequest())
     warnings: tuple[str, ...] = ()
     live: LiveView | None = None
 
@@ -84,7 +89,7 @@ class TrackingRun:
 
     def _track(self, on_frame: Callable[[Any], None]) -> None:
         self._wait_for_viewer()
-        last_s = float("-inf")
+        total, last_s = self.limit or self.source.total or 0, float("-inf")
         for frame in self.source.frames():
             tracked = self.tracker.track(frame.image, time_s=frame.time_s, reason=frame.problem)
             notes = [tracked.reason]
@@ -101,6 +106,7 @@ class TrackingRun:
             if self.overlay is not None:
                 self.overlay.add(frame.image, tracked, self.tracker.rest)
             on_frame(tracked)
+            tell(self.statistics.frames, total, "frames")
             if self.stop.is_requested:
                 self.ended_early = f"stopped by Ctrl-C after {self.statistics.frames} frames"
                 return
@@ -124,7 +130,7 @@ class TrackingRun:
 
 @contextmanager
 def stop_on_signal(stop: StopRequest) -> Iterator[None]:
-    """Within this context, the first SIGINT or SIGTERM ends the run after the current frame, the second at once."""
+    """Within this context, the first SIGINT or SIGTERM ends runs after the current frame, the second at once."""
 
     def request_stop(number: int, frame: Any) -> None:
         if stop.is_requested:
@@ -132,9 +138,11 @@ def stop_on_signal(stop: StopRequest) -> Iterator[None]:
         stop.is_requested = True
 
     earlier = {number: signal.signal(number, request_stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    token = _STOP.set(stop)
     try:
         yield
     finally:
+        _STOP.reset(token)
         for number, handler in earlier.items():
             signal.signal(number, handler)
 

@@ -154,7 +154,9 @@ def _annotation(annotation: Any) -> str:
         whole = ast.parse(annotation, mode="eval").body
         kind = ast.get_source_segment(annotation, whole.slice.elts[0])  # type: ignore[attr-defined]
         return " ".join(str(kind).split())
-    return annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
+    if isinstance(annotation, str):
+        return re.sub(r"\bdocuments\.\w+\.", "", annotation)
+    return getattr(annotation, "__name__", str(annotation))
 
 
 def _doc(found: Any) -> str:

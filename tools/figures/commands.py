@@ -11,8 +11,7 @@ import typer
 from typer.main import get_command
 
 from cmpdesign.cli import app
-from cmpdesign.cli.command import PURPOSES
-from cmpdesign.cli.options.output import NAMES, output_parameters
+from cmpdesign.cli.command import OUTPUT_OPTIONS, PURPOSES
 from cmpdesign.documents.document import Message
 from cmpdesign.documents.registry import DOCUMENTS
 
@@ -53,7 +52,7 @@ lines, and `cmpdesign schema` alone that of a design's TOML file.
 
 def page() -> str:
     """The text of the page."""
-    shared = _table("option", [_option_row(parameter) for parameter in output_parameters()])
+    shared = _table("option", [_option_row(parameter) for parameter in OUTPUT_OPTIONS])
     parts = [HEAD.format(shared=shared, message=_fields(Message.model_json_schema()))]
     sections = list(_commands(get_command(app), ()))
     for purpose, names in PURPOSES.items():
@@ -73,7 +72,7 @@ def _commands(group: Any, words: tuple[str, ...]) -> Iterator[tuple[tuple[str, .
 
 def _section(words: tuple[str, ...], command: Any) -> str:
     """A command: what it does, its arguments and options, its examples, its document."""
-    own = [parameter for parameter in command.params if parameter.name not in NAMES]
+    own = [parameter for parameter in command.params if parameter not in OUTPUT_OPTIONS]
     arguments = [_argument_row(each) for each in own if each.param_type_name == "argument"]
     options = [_option_row(each) for each in own if each.param_type_name == "option"]
     name = " ".join(words)

@@ -24,7 +24,7 @@ def camera_toml(found: CameraCalibration, response: str | float, date: str | Non
         date: of the pictures, YYYY-MM-DD.
     """
     view, size = found.camera, found.adjusted.problem.size_px
-    refused = [f"{one.name}: {one.cause}" for one in found.pictures if not one.used]
+    refused = [f"{one.picture}: {one.cause}" for one in found.pictures if not one.used]
     lines = [
         f"size_px = [{size[0]}, {size[1]}]",
         f"response = {_quoted(response) if isinstance(response, str) else repr(response)}",

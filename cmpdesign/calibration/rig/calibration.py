@@ -61,6 +61,14 @@ class RigCalibration:
         left = self.deviations[: len(self.stated)] / self.stated
         return tuple(name for name, share in zip(self.names, left, strict=False) if share > HELD)
 
+    def by_name(self) -> dict[str, dict[str, float]]:
+        """The values as ``parameters``, and their ``stated`` and later ``deviations``, by the names of the unknowns."""
+        return {
+            "parameters": dict(zip(self.names, self.values.tolist(), strict=False)),
+            "stated": dict(zip(self.names, self.stated.tolist(), strict=False)),
+            "deviations": dict(zip(self.names, self.deviations.tolist(), strict=True)),
+        }
+
 
 def calibrate_rig_markers(
     layout: Reference,

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from cmpdesign.calibration.rig.adjustment import RigStep
 from cmpdesign.calibration.rig.calibration import as_step, mean_of, misread_displacements, press_of
 from cmpdesign.calibration.rig.causes import LOCAL, PARTS, STEPS, Column, columns_by_cause
 from cmpdesign.calibration.rig.unknowns import Unknowns, see
+from cmpdesign.documents.calibration import CalibrateCheckDocument, CausePart
 from extractor import Markers, Reference, Rig, RigError, View
 from extractor.space.camera import is_covariance, is_finite
 
@@ -39,57 +40,6 @@ CONVERGED = 1e-3  # of the squares in a step
 UNSEEN = 1e3  # deviations of a marker that the views cannot show
 
 
-@dataclass(frozen=True, eq=False)
-class CauseFit:
-    """One possible cause, fitted.
-
-    Attributes:
-        cause: the cause.
-        left: residuals that the cause leaves, over those of the calibration.
-        changes: name -> value of what has changed, in the names' units.
-    """
-
-    cause: str
-    left: float
-    changes: Mapping[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class SensorCheck:
-    """The state of a sensor against its file.
-
-    Attributes:
-        rms_px: view -> RMS residual at rest, px per axis, with the file's views.
-        stated_px: view -> the same at the calibration; empty where the file does not tell.
-        misfit: residuals over those of the calibration, at most ``MAX_MISFIT`` where it holds.
-        limit_px: of the largest ``rms_px``, instead; None: none is stated.
-        picture_misfits: of each picture alone, in their order.
-        causes: all causes, the likeliest first.
-        likely: those that explain the residuals, and that the pictures do not tell apart; empty where it holds.
-        depth_error: relative error of depths that are read with the file, by the likeliest cause; above 0: too deep;
-            NaN with one view, or without a cause.
-    """
-
-    rms_px: Mapping[str, float]
-    stated_px: Mapping[str, float]
-    misfit: float
-    limit_px: float | None
-    picture_misfits: tuple[float, ...]
-    causes: tuple[CauseFit, ...]
-    likely: tuple[str, ...]
-    depth_error: float
-
-    @property
-    def holds(self) -> bool:
-        """Whether the calibration still is true."""
-        return not self.likely
-
-    @property
-    def steps(self) -> tuple[str, ...]:
-        """What to do, for each likely cause."""
-        return tuple(STEPS[cause] for cause in self.likely)
-
-
 class _Fit(NamedTuple):
     """The views and points of a cause, their residuals (V, M, 2) px, Huber's cost, and the K coefficients."""
 
@@ -102,46 +52,56 @@ class _Fit(NamedTuple):
 def check_markers(
     layout: Reference,
     rig: Rig,
-    rest: Sequence[Sequence[Markers]],
+    rest: Mapping[str, Sequence[Markers]],
     *,
     stated_px: Mapping[str, float],
     scale: float = 1.0,
     limit_px: float | None = None,
-) -> SensorCheck:
+    **state: Any,
+) -> CalibrateCheckDocument:
     """Compare pictures of the pad at rest with a calibrated rig.
 
     Args:
         layout: the pad's.
         rig: calibrated, with poses.
-        rest: the markers of one or more pictures, view by view.
-        stated_px: RMS residuals at the calibration.
+        rest: name of a picture -> its markers, view by view; one or more.
+        stated_px: view -> RMS residual at the calibration; empty where the file does not tell.
         scale: residuals at the calibration over the stated deviations of the markers.
         limit_px: largest RMS residual; None: by the deviations.
+        state: the fields of the document that do not follow from residuals; see ``state.py``.
+
+    Returns:
+        The document; ``found`` is the tuple of the causes that explain the residuals and that the pictures do not tell
+        apart, empty where the calibration holds. ``depth_error`` is above 0 where depths are read too deep.
     """
-    pictures = [as_step(one, 0.0) for one in rest]
-    today = _Today(layout, rig.views, mean_of(pictures), max(scale, 1.0))
+    pictures = {name: as_step(one, 0.0) for name, one in rest.items()}
+    today = _Today(layout, rig.views, mean_of(list(pictures.values())), max(scale, 1.0))
     unchanged, causes = today.fitted([]), columns_by_cause(today.unknowns)
-    alone = [_Today(layout, rig.views, one, today.scale).fitted([]) for one in pictures]
+    alone = {name: _Today(layout, rig.views, one, today.scale).fitted([]) for name, one in pictures.items()}
     found = {cause: today.fitted(columns) for cause, columns in causes.items()}
     errors = {cause: today.error(found[cause]) for cause in causes}
     order, misfit = sorted(errors, key=lambda cause: errors[cause]), today.error(unchanged)
     rms_px = np.sqrt(np.nanmean(unchanged.residual_px**2, axis=(1, 2)))
     holds = misfit <= MAX_MISFIT if limit_px is None else rms_px.max() <= limit_px
     likely = () if holds else _likely(errors, misfit, today.numbers)
-    fits = []
+    parts = []
     for cause in order:
         names = [column.name for column in causes[cause]]
         changes = dict(zip(names, found[cause].values.tolist(), strict=True))
-        fits.append(CauseFit(cause, errors[cause], changes))
-    return SensorCheck(
+        parts.append(CausePart(cause=cause, left=errors[cause], changes=changes, likely=cause in likely))
+    depth_error = today.depth_error(found[likely[0]].views) if set(likely) & set(found) else float("nan")
+    return CalibrateCheckDocument.of(
+        likely,
+        holds=not likely,
         rms_px=dict(zip(rig.names, rms_px.tolist(), strict=True)),
         stated_px=stated_px,
         misfit=misfit,
         limit_px=limit_px,
-        picture_misfits=tuple(today.error(one) for one in alone),
-        causes=tuple(fits),
-        likely=likely,
-        depth_error=today.depth_error(found[likely[0]].views) if set(likely) & set(found) else float("nan"),
+        picture_misfits={name: today.error(one) for name, one in alone.items()},
+        causes=parts,
+        steps=tuple(STEPS[cause] for cause in likely),
+        depth_error=depth_error if np.isfinite(depth_error) else None,
+        **state,
     )
 
 

@@ -34,13 +34,15 @@ class MirrorPair:
 
     Attributes:
         views: their names.
-        planes: their mirrors, for a camera that faces the pattern.
+        normals: of their mirrors, in the frame of the camera, which faces the pattern.
+        distances_mm: of their mirrors: normal' y = distance_mm.
         angle_deg: between the mirrors.
         shift_mm: along the line in which the mirrors meet, between the views; 0 for two plane mirrors.
     """
 
     views: tuple[str, str]
-    planes: tuple[MirrorPlane, MirrorPlane]
+    normals: tuple[tuple[float, ...], tuple[float, ...]]
+    distances_mm: tuple[float, float]
     angle_deg: float
     shift_mm: float
 
@@ -65,8 +67,14 @@ def _pair(first: View, second: View) -> MirrorPair | None:
     # a point of the line: the fixed point of the turn and shift
     across = shift - (axis @ shift) * axis
     point = np.linalg.lstsq(np.eye(3) - turn, across, rcond=None)[0]
-    planes = _planes(first, axis, point, angle)
-    return MirrorPair((first.name, second.name), planes, float(np.degrees(angle / 2)), float(axis @ shift))
+    one, other = _planes(first, axis, point, angle)
+    return MirrorPair(
+        views=(first.name, second.name),
+        normals=(tuple(one.normal.tolist()), tuple(other.normal.tolist())),
+        distances_mm=(one.distance_mm, other.distance_mm),
+        angle_deg=float(np.degrees(angle / 2)),
+        shift_mm=float(axis @ shift),
+    )
 
 
 def _planes(first: View, axis: Array, point: Array, angle: float) -> tuple[MirrorPlane, MirrorPlane]:

@@ -11,4 +11,3 @@ from cmpdesign.inputs.cameras.listing import list_cameras as list_cameras
 from cmpdesign.inputs.cameras.settings import CameraSettings as CameraSettings
 from cmpdesign.inputs.cameras.settings import CameraState as CameraState
 from cmpdesign.inputs.cameras.settings import set_camera as set_camera
-from cmpdesign.inputs.cameras.settings import size_from as size_from

@@ -98,20 +98,6 @@ class CameraState:
         }
 
 
-def size_from(text: str | None) -> tuple[int, int] | None:
-    """Width and height from "640x480".
-
-    Raises:
-        SourceError: another text.
-    """
-    if text is None:
-        return None
-    match = re.fullmatch(r"\s*(\d{1,5})\s*[xX]\s*(\d{1,5})\s*", text, re.ASCII)
-    if match is None or not int(match[1]) * int(match[2]):
-        raise SourceError(f"{parameter('camera_size')} {text}: expected WIDTHxHEIGHT, as in 1280x720")
-    return int(match[1]), int(match[2])
-
-
 def set_camera(capture: Any, wanted: CameraSettings, name: str) -> CameraState:
     """Ask the driver of an open camera for settings, and read back what it uses.
 

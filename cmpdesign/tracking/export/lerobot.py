@@ -29,7 +29,7 @@ from cmpdesign.tracking.export.lerobot_tables import (
     write_tasks,
 )
 from cmpdesign.tracking.export.run_images import require_sources, run_images
-from cmpdesign.tracking.export.runs import Run, read_run, require_one_kind
+from cmpdesign.tracking.export.runs import Run, load_run, require_one_kind
 from cmpdesign.tracking.export.statistics import ImageStatistics, Statistics, pooled, statistics_of
 from cmpdesign.tracking.export.video import Codec, CodecVideo, require_av
 from cmpdesign.tracking.sinks.unfinished import require_pyarrow
@@ -102,7 +102,7 @@ def _write_folder(folder: Path, runs: Sequence[Path], about: LeRobotDataSet) -> 
     first = 0
     try:
         for episode, run_path in enumerate(told(runs, len(runs), "runs")):
-            run = read_run(run_path)
+            run = load_run(run_path)
             arrays = _columns_of(run, episode, first, about.fps)
             row = {"episode_index": episode, "tasks": [about.task], "length": len(run)}
             row |= data.add(data_table(arrays))

@@ -68,12 +68,13 @@ class RunKind:
     contact: str
 
 
-def read_run(path: Path) -> Run:
-    """Read a run.
+def load_run(path: str | Path) -> Run:
+    """Read an .npz file of ``track`` or ``reconstruct``.
 
     Raises:
-        CmpDesignError: the file cannot be read, is no file of ``track`` or ``reconstruct``, or holds no frame.
+        CmpDesignError: the file cannot be read, is no file of these commands, or holds no frame.
     """
+    path = Path(path)
     kind = _kind_of(path)
     columns = _read_columns(path, *_COLUMNS[kind.format])
     if len(columns["frame"]) == 0:
@@ -93,7 +94,7 @@ def require_one_kind(paths: Sequence[Path]) -> RunKind:
     """Check that runs can be in one data set: of one layout, and of one command and its options.
 
     Raises:
-        CmpDesignError: see ``read_run``; or two runs differ.
+        CmpDesignError: see ``load_run``; or two runs differ.
     """
     kinds = [_kind_of(path) for path in paths]
     for path, kind in zip(paths[1:], kinds[1:], strict=True):
@@ -133,7 +134,7 @@ def uneven_times(runs: Sequence[Path], fps: float) -> tuple[str, ...]:
     """A sentence on each run whose times differ by more than half a frame from an even rate."""
     found = []
     for path in runs:
-        times_s = read_run(path).arrays["time_s"]
+        times_s = load_run(path).arrays["time_s"]
         late_s = times_s - times_s[0] - np.arange(len(times_s)) / fps
         shift_s = float(np.nanmax(np.abs(late_s), initial=0.0))
         if shift_s > 0.5 / fps:

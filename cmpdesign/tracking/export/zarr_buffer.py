@@ -18,7 +18,7 @@ from cmpdesign.files.atomic import Stage
 from cmpdesign.inputs.files import MAX_PIXELS
 from cmpdesign.libraries import extra
 from cmpdesign.tracking.export.run_images import require_sources, run_images
-from cmpdesign.tracking.export.runs import read_run, require_one_kind
+from cmpdesign.tracking.export.runs import load_run, require_one_kind
 from cmpdesign.watch import told
 
 PREFIX = "tactile_"
@@ -82,7 +82,7 @@ class _Buffer:
         self._ends: list[int] = []
 
     def add_run(self, path: Path, source: str | None, most_pixels: int) -> None:
-        run = read_run(path)
+        run = load_run(path)
         for name, values in run.arrays.items():
             self._append(PREFIX + name, values, CHUNK_FRAMES)
         if source is not None:

@@ -8,20 +8,23 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 from cmpdesign.documents.document import Document
 from cmpdesign.documents.runs import ReconstructDocument, TrackDocument
 from cmpdesign.errors import CmpDesignError, OutputError, parameter
+from cmpdesign.inputs.options import pixels_of
 from cmpdesign.inputs.texts import visible
 from cmpdesign.tracking.jobs.force_readers import contact_reader, contact_tracker
 from cmpdesign.tracking.jobs.options import SequenceOptions, ShapeOptions, TrackOptions
 from cmpdesign.tracking.live.options import Live
 from cmpdesign.tracking.recording.options import Recording
+from cmpdesign.watch import notice, warn
 
 if TYPE_CHECKING:
     from cmpdesign.contact.continuation import SurfaceContinuation
     from cmpdesign.contact.elastomer import Elastomer
+    from cmpdesign.tracking.live.view import LiveCount
     from cmpdesign.tracking.run import TrackingRun
     from cmpdesign.tracking.sources import Reading
     from extractor import ContactTracker, Reference, Tracker
@@ -30,7 +33,10 @@ Summary = TypeVar("Summary", bound=Document, covariant=True)
 
 
 class Job(Protocol[Summary]):
-    """A sequence to follow: the run is prepared, and its end is summed up."""
+    """A sequence to follow: the run is prepared, and its end is summed up in a document."""
+
+    @property
+    def document(self) -> type[Summary]: ...
 
     @property
     def output(self) -> Path: ...
@@ -44,8 +50,6 @@ class Job(Protocol[Summary]):
 
     def pictures(self, run: TrackingRun) -> dict[Path, bytes]: ...
 
-    def document(self, fields: dict[str, Any]) -> Summary: ...
-
 
 def reading_of(options: SequenceOptions) -> Reading:
     """How the source is read.
@@ -53,11 +57,12 @@ def reading_of(options: SequenceOptions) -> Reading:
     Raises:
         SourceError: a camera's size or format that cannot be.
     """
-    from cmpdesign.inputs.cameras import CameraSettings, size_from
+    from cmpdesign.inputs.cameras import CameraSettings
     from cmpdesign.tracking.sources import Reading
 
+    size = options["camera_size"]
     camera = CameraSettings(
-        size_from(options["camera_size"]),
+        None if size is None else pixels_of("camera_size", size),
         options["camera_fps"],
         options["camera_format"],
         options["exposure_ms"],
@@ -96,6 +101,7 @@ def viewer_of(options: SequenceOptions) -> Live | None:
 class TrackJob:
     """The inputs of ``track``, with all options."""
 
+    document: ClassVar = TrackDocument
     layout: Reference
     source: tuple[str, ...]
     output: Path
@@ -160,10 +166,6 @@ class TrackJob:
         )
         return found
 
-    def document(self, fields: dict[str, Any]) -> TrackDocument:
-        """The record of the run."""
-        return TrackDocument(**fields)
-
     def pictures(self, run: TrackingRun) -> dict[Path, bytes]:
         """The quiver plot, if a plot is wanted and a frame has a displacement."""
         farthest, rest = run.statistics.farthest, run.tracker.rest
@@ -182,6 +184,7 @@ class ReconstructJob:
     cameras.
     """
 
+    document: ClassVar = ReconstructDocument
     layout: Reference
     rig: Path
     rest: str
@@ -253,10 +256,6 @@ class ReconstructJob:
         found: dict[str, Any] = run.statistics.to_json(source, run.source.total, run.ended_early)
         return found
 
-    def document(self, fields: dict[str, Any]) -> ReconstructDocument:
-        """The record of the run."""
-        return ReconstructDocument(**fields)
-
     def pictures(self, run: TrackingRun) -> dict[Path, bytes]:
         """None."""
         return {}
@@ -286,15 +285,52 @@ def follow(job: Job[Summary], on_frame: Callable[[Any], None]) -> Summary:
 
     Raises:
         OutputError: a file cannot be written.
+        KeyboardInterrupt: stopped before the first frame.
     """
     run = job.prepare()
+    _give_notice(run)
+    said = len(run.source.notes)
     try:
         run.go(on_frame)
     except OutputError:
-        with suppress(OutputError):
+        with suppress(OutputError, CmpDesignError):
             write_summary(run, job)
         raise
+    finally:
+        if run.live is not None:
+            _warn_of_losses(run.live.count())
+    if run.stop.is_requested and not run.statistics.frames:
+        raise KeyboardInterrupt
+    for note in run.source.notes[said:]:
+        warn(note)
     return write_summary(run, job)
+
+
+def _give_notice(run: TrackingRun) -> None:
+    """Report what is known before the first frame; the times of a live source are known at its end."""
+    source = run.source
+    for warning in (*run.warnings, *source.notes):
+        warn(warning)
+    times = f"{visible(source.name)}: {source.times.text}"
+    if source.times.is_doubtful:
+        warn(times)
+    elif not source.is_live:
+        notice(times)
+    if run.live is not None:
+        notice(f"live at {run.live.address}")
+
+
+def _warn_of_losses(count: LiveCount) -> None:
+    """Report the frames that viewers did not receive."""
+    if count.failure:
+        warn(f"the live server stopped after {count.sent} frames ({count.failure})")
+    if count.left_out:
+        total = count.sent + count.left_out
+        warn(f"{count.left_out} of {total} frames were not shown live: there was no time to send them")
+    if count.is_viewer_behind:
+        warn(
+            "a live viewer read more slowly than the frames were made; some frames were not sent to the viewer"
+        )
 
 
 def write_summary(run: TrackingRun, job: Job[Summary]) -> Summary:
@@ -316,7 +352,7 @@ def write_summary(run: TrackingRun, job: Job[Summary]) -> Summary:
         summary["live"] = {"address": run.live.address, **run.live.count()._asdict()}
     # Tables of several formats in one folder have a summary each.
     place = job.output.with_name(job.output.name + ".summary.json")
-    document = job.document(summary)  # its schema is that of the file
+    document = job.document.of(run, **summary)  # its schema is that of the file
     contents: dict[Path, str | bytes] = {place: json.dumps(summary, indent=2, ensure_ascii=False) + "\n"}
     contents |= job.pictures(run)
     for path, content in contents.items():

@@ -11,10 +11,27 @@ from cmpdesign.inputs.options import Channels, Preset, Response, Side, Usual
 RESPONSE = "srgb|linear|EXPONENT"
 
 
-class SequenceOptions(TypedDict, total=False):
+class ReadingOptions(TypedDict, total=False):
+    """How pictures are read.
+
+    Keys:
+        preset: speed or accuracy of the positions; the ids are the same.
+        response: response of the camera; with an exponent, light is value ** exponent; None: srgb; 16 bits linear.
+        side: side of the pattern that the camera sees; designed: as stated in the layout.
+        channels: rgb: the pictures' red and blue are swapped, as an RGB array saved by OpenCV.
+    """
+
+    preset: Annotated[Preset, Usual("balanced")]
+    response: Annotated[Response | None, Usual(None, metavar=RESPONSE)]
+    side: Annotated[Side, Usual("designed")]
+    channels: Annotated[Channels, Usual("bgr")]
+
+
+class SequenceOptions(ReadingOptions, total=False):
     """How a sequence is read and shown.
 
     Keys:
+        preset, response, side, channels: see ``ReadingOptions``.
         fps: frames per second; None: a video's own; 30 for a folder.
         times: times of the frames: names (their numbers), index (the count), or a .csv of FRAME,SECONDS; None: what the
             names say; a video's own.
@@ -28,10 +45,6 @@ class SequenceOptions(TypedDict, total=False):
         focus: focus in the camera's own unit; switches automatic focus off.
         frames: stop after this many frames.
         cold: number every frame without the previous frame: slower.
-        preset: speed or accuracy of the positions; the ids are the same.
-        response: response of the camera; with an exponent, light is value ** exponent; None: srgb; 16 bits linear.
-        side: side of the pattern that the camera sees; designed: as stated in the layout.
-        channels: rgb: the pictures' red and blue are swapped, as an RGB array saved by OpenCV.
         max_pixels: largest image that is read: width times height.
         frame_id: coordinate frame and first part of the topics of a recording.
         with_images: also record or show the frames' images, without loss.
@@ -52,10 +65,6 @@ class SequenceOptions(TypedDict, total=False):
     focus: Annotated[float | None, Usual(None, least=0)]
     frames: Annotated[int | None, Usual(None, least=1)]
     cold: Annotated[bool, Usual(False)]
-    preset: Annotated[Preset, Usual("balanced")]
-    response: Annotated[Response | None, Usual(None, metavar=RESPONSE)]
-    side: Annotated[Side, Usual("designed")]
-    channels: Annotated[Channels, Usual("bgr")]
     max_pixels: Annotated[int, Usual(MAX_PIXELS, metavar="COUNT", least=256)]
     frame_id: Annotated[str, Usual("tactile", metavar="NAME")]
     with_images: Annotated[bool, Usual(False)]

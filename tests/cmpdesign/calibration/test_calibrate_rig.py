@@ -230,10 +230,16 @@ def test_the_cause_of_larger_residuals_is_named(change: str) -> None:
     rng, layout, views = np.random.default_rng([46, 3]), reference(layers=5), sensor_views()
     likely, changed, size = CHANGES[change]
     places = pressed(layout.xy_mm, 0.2) if change == "touch" else flat(layout) * size
-    rest = [[noisy(layout, changed(view), places, rng, 0.01) for view in views] for _ in range(2)]
-    found = check_markers(layout, Rig(views), rest, stated_px={})
+    rest = {
+        name: [noisy(layout, changed(view), places, rng, 0.01) for view in views]
+        for name in ("a.png", "b.png")
+    }
+    found = check_markers(
+        layout, Rig(views), rest, stated_px={}, views={}, cameras={}, force=None, ages_days={}
+    )
     assert found.holds == (change == "nothing")
-    assert found.likely == likely
+    assert found.found == likely
+    assert {one.cause for one in found.causes if one.likely} == {*likely} - {LOCAL}
     if change == "focus":  # the file's focal length is smaller than the true one, so that all is read larger
         deeper = pressed(layout.xy_mm, 0.5)
         read = [noisy(layout, changed(view), deeper, rng, 1e-4) for view in views]
@@ -261,13 +267,15 @@ def test_two_mirrors_are_found_up_to_a_turn_about_their_common_line() -> None:
     assert found.shift_mm == pytest.approx(0, abs=1e-9)
     between = np.degrees(np.arccos(abs(normals[0] @ normals[1])))
     assert min(found.angle_deg, 180 - found.angle_deg) == pytest.approx(between)
-    first, second = (np.eye(3) - 2 * np.outer(p.normal, p.normal) for p in found.planes)
+    first, second = (np.eye(3) - 2 * np.outer(normal, normal) for normal in found.normals)
     turn = views[0].R_camera_from_layout @ views[1].R_camera_from_layout.T
     np.testing.assert_allclose(first @ second, turn, atol=1e-9)
     # both planes reflect the virtual cameras to one and the same real camera
     at = [
-        mirror @ (view.t_camera_from_layout_mm - 2 * plane.distance_mm * plane.normal)
-        for mirror, view, plane in zip((first, second), views, found.planes, strict=True)
+        mirror @ (view.t_camera_from_layout_mm - 2 * distance_mm * np.array(normal))
+        for mirror, view, normal, distance_mm in zip(
+            (first, second), views, found.normals, found.distances_mm, strict=True
+        )
     ]
     np.testing.assert_allclose(at[0], at[1], atol=1e-9)
 

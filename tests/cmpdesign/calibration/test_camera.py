@@ -82,7 +82,7 @@ def test_pictures_that_contradict_are_named_with_their_cause() -> None:
     (bent,) = see(view, sheet, 1, rng, height_mm=0.8)
     sightings[7] = bent._replace(name="p7.png")
     found = calibrate_points(sheet, sightings, SIZE_PX, MODELS[1:2])
-    causes = {one.name: one.cause for one in found.pictures if one.cause}
+    causes = {one.picture: one.cause for one in found.pictures if one.cause}
     assert set(causes) == {"p2.png", "p7.png"}
     assert "focal length" in causes["p2.png"] and "bent" in causes["p7.png"]
     assert found.camera.focal_px[0] == pytest.approx(view.focal_px[0], abs=0.2)
@@ -118,7 +118,7 @@ def test_deviations_follow_from_how_pictures_agree() -> None:
     # a contradiction that is hidden in the scatter of the points, but not in the answer about the lens
     sightings[4] = zoomed(sightings[4], 0.002)
     doubtful = calibrate_points(sheet, sightings, SIZE_PX, MODELS[1:2])
-    assert [one.name for one in doubtful.pictures if not one.used] == ["p4.png"]
+    assert [one.picture for one in doubtful.pictures if not one.used] == ["p4.png"]
     assert max(one.scale for one in doubtful.pictures) < 2
 
 

@@ -105,10 +105,10 @@ def strip(pad: str, **how: Unpack[More]) -> dict[str, Any]:
 def test_a_new_option_of_a_record_is_an_option_of_the_command() -> None:
     seen = []
 
-    @derived(strip)
-    def command(pad: str, **how: Any) -> None:
+    @derived(strip, "cutting")
+    def command(found: dict[str, Any]) -> None:
         """More words."""
-        seen.append(strip(pad, **how))
+        seen.append(found)
 
     made = typer.Typer(rich_markup_mode=None)
     made.command()(command)

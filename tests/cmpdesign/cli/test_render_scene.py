@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cmpdesign.cli.app import app
+from cmpdesign.cli import app
 from cmpdesign.errors import CmpDesignError, OutputError
 from cmpdesign.files.layout_json import layout_to_json
 from cmpdesign.layout.layout import Layout
@@ -43,7 +43,7 @@ def test_the_command_draws_pictures_videos_and_folders(
 ) -> None:
     folder, film, truth = tmp_path / "frames", tmp_path / "film.mkv", tmp_path / "truth.npz"
     code, said = run(MOVING, "-o", folder, "--truth", truth)
-    assert code == 0 and "5 frames of 96 x 80 px at 4 fps" in said
+    assert code == 0 and "size 96 x 80 px" in said and "frames 5 fps 4" in said
     pictures = [cv2.imread(str(path)) for path in sorted(folder.iterdir())]
     expected = [render(scene, size=SIZE) for scene in scene_writer(tmp_path, layout)(MOVING).scenes()]
     assert len(load_truths(truth)[0]) == len(pictures) == 5
@@ -56,7 +56,7 @@ def test_the_command_draws_pictures_videos_and_folders(
     video.release()
     still = MOVING.partition("[sequence]")[0]
     code, said = run(still, "-o", tmp_path / "one.png", "--truth", truth, "--size", "60x50", "--seed", 3)
-    assert code == 0 and "one.png: 60 x 50 px" in said
+    assert code == 0 and "size 60 x 50 px" in said
     assert cv2.imread(str(tmp_path / "one.png")).shape == (50, 60, 3)
     assert load_truth(truth).marker_xy_px.shape == (19, 2)
 

@@ -24,10 +24,9 @@ from tests.support.command import refused, run
 def test_the_design_fits_the_view_and_has_no_finding(camera: str, view: str, error: str | None) -> None:
     proposal = cmpdesign.size(camera, view, error)
     size_mm = proposal.design.layout.size_mm
-    assert size_mm[0] <= proposal.view.width and size_mm[1] <= proposal.view.height
-    assert max(size_mm[0] / proposal.view.width, size_mm[1] / proposal.view.height) > 0.995
-    width, height = (int(side) for side in proposal.camera)
-    assert proposal.design.check((width, height)).findings == ()
+    assert size_mm[0] <= proposal.view_mm[0] and size_mm[1] <= proposal.view_mm[1]
+    assert max(size_mm[0] / proposal.view_mm[0], size_mm[1] / proposal.view_mm[1]) > 0.995
+    assert proposal.design.check(proposal.camera_px).findings == ()
 
 
 @pytest.mark.parametrize(
@@ -60,9 +59,10 @@ def test_the_error_that_is_measured_is_the_predicted_one(
         inner.append(squares[layout.marker_layer < layout.marker_layer.max() - 1])
         rim.append(squares[outermost & layout.present])
     measured_px = np.sqrt(np.concatenate(inner).mean())
-    assert measured_px == pytest.approx(proposal.error.inner_px, rel=0.12)
-    assert np.sqrt(np.concatenate(rim).mean()) == pytest.approx(proposal.error.rim_px, rel=0.25)
-    assert proposal.error_um == pytest.approx(1000 * proposal.error.inner_px / proposal.scale_px_per_mm)
+    assert measured_px == pytest.approx(proposal.error_px, rel=0.12)
+    rim_px = proposal.rim_error_um * proposal.scale_px_per_mm / 1000
+    assert np.sqrt(np.concatenate(rim).mean()) == pytest.approx(rim_px, rel=0.25)
+    assert proposal.error_um == pytest.approx(1000 * proposal.error_px / proposal.scale_px_per_mm)
 
 
 def test_a_wanted_error_is_met_by_the_finest_such_design() -> None:

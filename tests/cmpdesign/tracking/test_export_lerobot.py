@@ -47,7 +47,7 @@ def dataset(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = ("export", "lerobot", made / "a.npz", made / "b.npz", "-o", path, "--task", "press", *images)
     result = run(*command)
     assert result.exit_code == 0, result.output
-    assert f"2 episodes, {FRAMES + SHORT} frames at 25 frames per second" in " ".join(result.stdout.split())
+    assert f"episodes 2 frames {FRAMES + SHORT} fps 25" in " ".join(result.stdout.split())
     return path
 
 

@@ -177,9 +177,7 @@ def test_the_touched_surface_is_continued_on_wish(made: Path, tmp_path: Path) ->
     out = tmp_path / "out.npz"
     result = run("reconstruct", *files, str(made / "frames"), "-o", str(out), "--surface")
     assert result.exit_code in (0, 1), result.output
-    assert "1 mm below the touched surface; surface_* are of the touched surface" in " ".join(
-        result.output.split()
-    )
+    assert "of pattern, depth 1 mm, continued to surface yes" in " ".join(result.output.split())
     table = np.load(out)
     pattern, surface = table["3D_Displacements"][:, :MARKERS], table["surface_displacement_mm"]
     assert surface.shape == pattern.shape and (np.isnan(surface) == np.isnan(pattern)).all()

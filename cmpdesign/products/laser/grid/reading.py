@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from cmpdesign.files.images import Image
-from cmpdesign.products.laser.coupon.design import Coupon, Patch
+from cmpdesign.products.laser.coupon.design import Coupon, Face, Patch
 from cmpdesign.products.laser.coupon.fiducials import find_fiducials, fit_fiducials
+from cmpdesign.products.laser.coupon.photo import CouponReading, read_coupon
 from cmpdesign.products.laser.coupon.picture import (
     CouponPicture,
     PhotoError,
@@ -23,6 +25,7 @@ from cmpdesign.products.laser.coupon.picture import (
     decode_image,
     eight_bit_gray,
 )
+from cmpdesign.products.laser.coupon.stated_response import stated_response
 from cmpdesign.products.laser.grid.design import APART_MM, field_of
 from extractor.image.response import Response, light_of_values
 
@@ -110,6 +113,24 @@ class GridReading:
         best = None if self.best is None else self.best.name
         scale = round(self.scale_px_mm, 4)
         return {"scale_px_mm": scale, "from_back": self.from_back, "best": best, "fields": fields}
+
+
+def read_cut(
+    coupon: Coupon, file: Path, image: Image, response: Response | None = None, face: Face | None = None
+) -> CouponReading | GridReading:
+    """Read the picture of a coupon, or of a grid.
+
+    Args:
+        coupon: the coupon or the grid.
+        file: the picture's file, which may state its response.
+        image, response, face: see ``read_coupon`` and ``read_grid``.
+
+    Raises:
+        PhotoError: see ``read_coupon`` and ``read_grid``.
+    """
+    if coupon.kind == "grid":
+        return read_grid(coupon, image, response or "srgb")
+    return read_coupon(coupon, image, response=response, stated=stated_response(file), face=face)
 
 
 def read_grid(grid: Coupon, image: Image, response: Response = "srgb") -> GridReading:

@@ -1,34 +1,46 @@
-"""Values on the command line that are written in a form of their own: sizes, responses, pairs."""
+"""Values on the command line: sources, sizes, pairs, responses, and the names of templates that shells complete."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, cast
+
+import typer
 
 from cmpdesign.errors import CmpDesignError
 from cmpdesign.inputs.options import Response, Written
 
+SourcesArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="SOURCE",
+        help='Pictures, folders, patterns such as "run*/*.png", a video, a camera\'s number, or rtsp://...',
+    ),
+]
 
-def parse_pixels(option: str, text: str, largest: int) -> tuple[int, int]:
-    """Width and height from "640x480" or "640 X 480".
 
-    Args:
-        option: name of the option, for the message.
-        text: its value.
-        largest: largest width and height, px.
+def _names(*kinds: str) -> Callable[[str], list[str]]:
+    """Completes the names of templates of some kinds; without a kind those of all."""
 
-    Raises:
-        CmpDesignError: another text, or a side that is not from 10 to ``largest``.
-    """
-    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×]\s*(\d{1,6})\s*", text, re.ASCII)
-    sides = (int(match[1]), int(match[2])) if match else (0, 0)
-    if min(sides) < 10 or max(sides) > largest:
-        raise CmpDesignError(
-            f"{option} {text}: expected WIDTHxHEIGHT, 10 to {largest} pixels each, as in 640x480"
-        )
-    return sides
+    def complete(incomplete: str) -> list[str]:
+        from cmpdesign.design.templates import template_kinds
+
+        every = template_kinds()
+        return [name for kind in kinds or every for name in every[kind] if name.startswith(incomplete)]
+
+    return complete
+
+
+# The parameter of a call -> the names that begin with a text.
+COMPLETIONS: Mapping[str, Callable[[str], list[str]]] = {
+    "design": _names("designs"),
+    "designs": _names("designs"),
+    "extends": _names("designs"),
+    "scene": _names("scenes"),
+    "plan": _names("plans"),
+    "show": _names(),
+}
 
 
 def parse_pairs(option: str, texts: Sequence[str], key: type, written: Written) -> dict[Any, str]:
@@ -59,31 +71,21 @@ def parse_pairs(option: str, texts: Sequence[str], key: type, written: Written) 
     return pairs
 
 
-def parse_response(text: str) -> Response:
-    """The response from "srgb", "linear" or an exponent.
+def parse_response(text: str | None) -> Response | None:
+    """The response from "srgb", "linear" or an exponent; None where the option is not given.
 
     Raises:
         CmpDesignError: another text, or an exponent beyond its limits.
     """
-    if text == "srgb":
-        return "srgb"
-    if text == "linear":
-        return "linear"
+    if text in (None, "srgb", "linear"):
+        return cast("Response | None", text)
+    from extractor.image.response import light_of_values
+
     try:
         exponent = float(text)
+        light_of_values(exponent)
     except ValueError:
         raise CmpDesignError(
             f"--response {text}: expected srgb, linear or an exponent from 0.2 to 5, as in 2.2"
         ) from None
-    from extractor.image.response import light_of_values
-
-    try:
-        light_of_values(exponent)
-    except ValueError as error:
-        raise CmpDesignError(f"--response {text}: {error}") from None
     return exponent
-
-
-def parse_reading_response(text: str | None) -> Response | None:
-    """As ``parse_response``; None where the option is not given: the response follows from the image's depth."""
-    return None if text is None else parse_response(text)
