@@ -60,7 +60,7 @@ def exposed(image: NDArray[np.uint8], factor: float) -> NDArray[np.uint8]:
 )
 def test_blur_noise_and_scale_are_the_scenes(blur: float, noise: float, pitch_px: float) -> None:
     quality = quality_of(shot(blur=blur, noise=noise, pitch_px=pitch_px).image)
-    assert quality.blur_px == pytest.approx(np.sqrt(blur**2 + 1 / 12), rel=0.2)
+    assert quality.blur_px == pytest.approx(np.sqrt(blur**2 + 1 / 12), rel=0.05)
     assert quality.noise == pytest.approx(noise, rel=0.25)
     assert quality.edge_px == pytest.approx(pitch_px, rel=0.01)
     assert not quality.hints

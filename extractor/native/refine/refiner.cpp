@@ -74,6 +74,14 @@ std::optional<Parallax> unknown_parallax(const UnevenDotGain& change, double wid
   return out;
 }
 
+// The blur in the full image, px, of a blur in an image at 1/scale of its size: both contain their pixels,
+// and a pixel's own variance is a twelfth of its area.
+double full_scale_blur(double sigma, double scale) {
+  constexpr double OWN_VARIANCE = 1.0 / 12.0;
+  const double variance = scale * scale * (sigma * sigma - OWN_VARIANCE) + OWN_VARIANCE;
+  return std::sqrt(std::max(variance, OWN_VARIANCE));
+}
+
 }  // namespace
 
 RefinedMarkers refined_markers(const image::PyramidLevel& view, const layout::Topology& topology,
@@ -92,7 +100,7 @@ RefinedMarkers refined_markers(const image::PyramidLevel& view, const layout::To
   return {std::move(markers.xy_px),
           std::move(markers.cov_px2),
           std::move(markers.unaccepted),
-          scale * after.sigma,
+          full_scale_blur(after.sigma, scale),
           scale * after.noise,
           {view.scale, after.sigma, after.noise, std::move(after.levels), first.pixel_noise,
            unknown_parallax(after.uneven_dot_gain, width, height, limits.parallax)},
