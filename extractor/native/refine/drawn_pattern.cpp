@@ -58,7 +58,6 @@ DrawnPattern draw_pattern(const image::PyramidLevel& view, const layout::Topolog
   update_with_offsets(lines, ink_offsets(state.ink_shift, lines, state.maps, topology));
   const GridlineSides beside(lines, xy, cells, edge_cells, view.frame);
   Array<double, 2> sides = beside.light(levels);
-  fill_zeros(picture, box);
   draw_cells({xy, cells, topology.cell_edges, edges, lines}, {levels.cell, levels.slope, sigma}, box,
              picture);
   LevelArrays corrected = corrected_levels({view, topology, picture, state}, levels, limits.levels);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/parts.hpp"
 #include "refine/measure/gridline_bending.hpp"
 #include "refine/synthesis/residual_kernel.hpp"
 
@@ -66,9 +67,9 @@ CurvedGradients curved_gradients(const GridlineSystem& system, const ShiftGradie
   const auto edges = system.edges;
   const Array<double, 3> maps = maps_of_shifts(curved, shift, limits);
   CurvedGradients out{gradients.copy(), gradients.copy()};
-  for (Index e = 0; e < edges.size(); ++e) {
+  const auto add = [&](Index e) {
     const auto sums = system.sums[e], own = system.curving[e];
-    if (system.weight[e] * system.lines(e, KNOWN) == 0.0) continue;
+    if (system.weight[e] * system.lines(e, KNOWN) == 0.0) return;
     const Index a = edges(e, 0), b = edges(e, 1);
     const Normal normal(system.lines, e);
     const double start = normal.of(shift(a, 0), shift(a, 1)), end = normal.of(shift(b, 0), shift(b, 1));
@@ -83,7 +84,10 @@ CurvedGradients curved_gradients(const GridlineSystem& system, const ShiftGradie
     out.left.end[e] -= bc * bend + bd * slant;
     out.others.start[e] = out.left.start[e] + own[0] * sums[AA] * start + own[2] * sums[AB] * end;
     out.others.end[e] = out.left.end[e] + own[1] * sums[BB] * end + own[2] * sums[AB] * start;
-  }
+  };
+  in_parts(edges.size(), edges.size(), [&](Index begin, Index end) {
+    for (Index e = begin; e < end; ++e) add(e);
+  });
   return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/parts.hpp"
 #include "image/response.hpp"
 #include "refine/synthesis/gridlines.hpp"
 
@@ -64,23 +65,27 @@ Array<double, 2> GridlineSides::light(const InkLevels& levels) const {
   const auto black = levels.black;
   std::array<Channels, POLYNOMIAL_TERMS> factors;
   for (Index k = 0; k < POLYNOMIAL_TERMS; ++k) factors[k] = {black(0, k), black(1, k), black(2, k), 0.0};
-  for (const KnownGridline& line : known_) {
-    Channels level{};
-    for (std::size_t k = 0; k < factors.size(); ++k) {
-      for (std::size_t channel = 0; channel < level.size(); ++channel)
-        level[channel] += line.terms[k] * factors[k][channel];
-    }
-    const auto own = out[line.edge];
-    for (Index channel = 0; channel < 3; ++channel)
-      own[BEFORE + channel] = own[BEYOND + channel] = level[channel];
-    for (const auto& [i, side, x, y] : line.neighbours) {
-      if (i < 0) continue;
-      for (Index channel = 0; channel < 3; ++channel) {
-        const double rise = slope(i, channel, 0) * x + slope(i, channel, 1) * y;
-        own[side + channel] += cell(i, channel) + rise;
+  const auto count = static_cast<Index>(known_.size());
+  in_parts(count, count, [&](Index begin, Index end) {
+    for (Index n = begin; n < end; ++n) {
+      const KnownGridline& line = known_[static_cast<std::size_t>(n)];
+      Channels level{};
+      for (std::size_t k = 0; k < factors.size(); ++k) {
+        for (std::size_t channel = 0; channel < level.size(); ++channel)
+          level[channel] += line.terms[k] * factors[k][channel];
+      }
+      const auto own = out[line.edge];
+      for (Index channel = 0; channel < 3; ++channel)
+        own[BEFORE + channel] = own[BEYOND + channel] = level[channel];
+      for (const auto& [i, side, x, y] : line.neighbours) {
+        if (i < 0) continue;
+        for (Index channel = 0; channel < 3; ++channel) {
+          const double rise = slope(i, channel, 0) * x + slope(i, channel, 1) * y;
+          own[side + channel] += cell(i, channel) + rise;
+        }
       }
     }
-  }
+  });
   return sides;
 }
 

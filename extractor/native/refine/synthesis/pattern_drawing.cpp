@@ -150,6 +150,7 @@ void draw_cells(const CellGeometry& geometry, const CellAppearance& appearance,
   in_parts(box[3] - top, geometry.edges.size(), [&](Index begin, Index end) {
     const std::array<std::int64_t, 4> band{box[0], top + begin, box[2], top + end};
     const View<const std::int64_t, 1> rows(band.data(), {4});
+    for (Index y = band[1]; y < band[3]; ++y) model[y].slice(box[0], box[2]).flat().fill(0.0F);
     const auto drawing = std::make_unique<CellDrawing>(geometry, appearance, rows, model);
     for (Index i = 0; i < geometry.cells.size(); ++i) {
       const auto edges = geometry.cell_edges[i];

@@ -24,9 +24,9 @@ struct CellAppearance {
   double sigma;                  // px, the blur
 };
 
-// Adds all cells whose sides are known to a drawing.
+// Draws all cells whose sides are known over zeros.
 //
-// box (4,) px, x from, y from, x to, y to; nothing is drawn outside. model (H, W, 3), the drawing.
+// box (4,) px, x from, y from, x to, y to; nothing is written outside. model (H, W, 3), the drawing.
 void draw_cells(const CellGeometry& geometry, const CellAppearance& appearance,
                 View<const std::int64_t, 1> box, View<float, 3> model);
 

@@ -79,10 +79,6 @@ class ResidualReader {
 
 }  // namespace
 
-void fill_zeros(View<float, 3> model, View<const std::int64_t, 1> box) {
-  for (Index y = box[1]; y < box[3]; ++y) model[y].slice(box[0], box[2]).flat().fill(0.0F);
-}
-
 ResidualSums accumulate_residual_sums(const image::PyramidLevel& view, View<const float, 3> model,
                                       const DrawnGridlines& drawn, double sigma,
                                       View<const std::int64_t, 1> box, Index stations,

@@ -36,9 +36,6 @@ struct ResidualSums {
       stations;  // (E, m, 2), at the stations of each gridline, as accumulate_station_sums gives them
 };
 
-// Fills the box (x from, y from, x to, y to; px) of an image (H, W, 3) with zeros.
-void fill_zeros(View<float, 3> model, View<const std::int64_t, 1> box);
-
 // The sums over the pixels near each gridline, and around `stations` stations of each.
 //
 // model (H, W, 3), the light of the drawn pattern over black; sigma px, the blur; box (4,) px, x from, y
