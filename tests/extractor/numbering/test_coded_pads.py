@@ -82,7 +82,7 @@ def test_a_plain_layout_does_not_number_a_coded_pad() -> None:
 def test_bits_of_several_parts_prove_a_motion_together(number: int) -> None:
     """Covers cut these crops in parts of less than 50 cells, and no part has bits enough."""
     result = read_view(DrawnView(DAMAGED, 7302, number, CODE, (40.0, 72.0)))
-    assert 60 <= result.black_cells < 70 and result.reported > 100 and result.wrong_ids == 0
+    assert 60 <= result.seen.black_cells < 70 and result.reported > 100 and result.wrong_ids == 0
 
 
 def test_small_cells_beside_white_ones_are_found_in_one_look() -> None:
